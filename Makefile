@@ -1,0 +1,206 @@
+# Lathe. `make help` lists the targets.
+#
+#   config=release (default) | debug | sanitize | fuzz      objects go to build/$(config)/
+#   CC, CXX, CFLAGS, LDFLAGS, CLANG, V=1                     as everywhere
+
+config ?= release
+B := build/$(config)
+V ?= 0
+Q := $(if $(filter 0,$(V)),@)
+ifeq ($(origin CC),default)
+CC := gcc
+endif
+ifeq ($(origin CXX),default)
+CXX := g++
+endif
+CLANG ?= clang
+CLANGXX ?= clang++
+WASM_LD ?= wasm-ld
+
+# ---- sources: found by wildcard, but for the decoder that becomes wasm -------------------------------------------------
+
+CORE := $(wildcard core/*.c)
+CODEC := $(filter-out codec/wasm_exports.c,$(wildcard codec/*.c))
+CODEC_CXX := $(wildcard codec/*.cc)
+SERVER := $(filter-out server/main.c,$(wildcard server/*.c))
+UNIT_TESTS := $(basename $(notdir $(wildcard tests/test_*.c)))
+CHECKS := $(basename $(notdir $(wildcard tests/*_check.cpp)))
+FUZZERS := $(basename $(notdir $(wildcard tests/fuzz_*.c)))
+
+# The decoder. Linking it proves that it needs no volume, no ray casting on grey values and no file.
+WASM_SOURCES := $(addprefix core/,status.c arena.c ray.c crossing.c contour.c grammar.c tiling.c centre.c outline.c triangulate.c \
+                  overlay.c tube.c builder.c level.c refinement.c mask.c mesh.c) \
+                $(addprefix codec/,range_decoder.c occupancy_model.c occupancy_decode.c base_shape.c base_decode.c \
+                  structure_state.c structure_decode.c archive_parse.c crc32c.c decode.c) \
+                $(wildcard web/wasm/*.c)
+
+# ---- flags -------------------------------------------------------------------------------------------------------------
+
+ifeq ($(config),release)
+  OPTIMISE := -O2 -DNDEBUG
+else ifeq ($(config),debug)
+  OPTIMISE := -O0 -g
+else ifeq ($(config),sanitize)
+  OPTIMISE := -O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=undefined
+  LINK_MODE := -fsanitize=address,undefined
+else ifeq ($(config),fuzz)
+  CC := $(CLANG)
+  CXX := $(CLANGXX)
+  OPTIMISE := -O1 -g -fno-omit-frame-pointer -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=undefined
+  LINK_MODE := -fsanitize=address,undefined
+else
+  $(error config=$(config): it is one of release, debug, sanitize, fuzz)
+endif
+
+WARNINGS := -Wall -Wextra -Werror
+# No contraction of a*b+c: every platform computes the same positions.
+COMMON = $(OPTIMISE) $(WARNINGS) -ffp-contract=off -D_GNU_SOURCE -Icore -Icodec -Iserver -Itests -I/usr/include/nifti -MMD -MP
+ALL_CFLAGS = -std=c11 $(COMMON) $(CFLAGS)
+ALL_CXXFLAGS = -std=c++17 $(COMMON) $(CXXFLAGS)
+LIBS := -Wl,--as-needed -lmicrohttpd -ljansson -ldraco -lnifti2 -lznz -lz -lbrotlienc -lpthread -lm
+
+WASM := build/wasm/lathe.wasm
+VIEWER := web/dist/viewer.html
+
+# ---- the program -------------------------------------------------------------------------------------------------------
+
+.PHONY: all
+all: build/lathe ## build the program (the default): build/lathe
+
+build/lathe: $(B)/lathe FORCE
+	@cmp -s $< $@ || install -m 755 $< $@
+
+LIBRARY := $(B)/liblathe.a
+SERVER_LIBRARY := $(B)/liblathe_server.a
+LIBRARY_OBJECTS := $(patsubst %.c,$(B)/%.o,$(CORE) $(CODEC)) $(patsubst %.cc,$(B)/%.o,$(CODEC_CXX))
+SERVER_OBJECTS := $(patsubst %.c,$(B)/%.o,$(SERVER))
+
+$(LIBRARY): $(LIBRARY_OBJECTS)
+	$(Q)rm -f $@ && $(AR) rcs $@ $^
+$(SERVER_LIBRARY): $(SERVER_OBJECTS)
+	$(Q)rm -f $@ && $(AR) rcs $@ $^
+
+$(B)/lathe: $(B)/server/main.o $(B)/server/viewer_page.o $(SERVER_LIBRARY) $(LIBRARY)
+	@echo "  link  $@"
+	$(Q)$(CXX) $(LINK_MODE) $(LDFLAGS) -o $@ $^ $(LIBS)
+
+$(B)/%.o: %.c
+	@mkdir -p $(@D)
+	@echo "  cc    $<"
+	$(Q)$(CC) $(ALL_CFLAGS) -c -o $@ $<
+$(B)/%.o: %.cc
+	@mkdir -p $(@D)
+	@echo "  c++   $<"
+	$(Q)$(CXX) $(ALL_CXXFLAGS) -c -o $@ $<
+$(B)/%.o: %.cpp
+	@mkdir -p $(@D)
+	@echo "  c++   $<"
+	$(Q)$(CXX) $(ALL_CXXFLAGS) -c -o $@ $<
+
+# The viewer page is linked into the program as it is.
+$(B)/server/viewer_page.o: server/viewer_page.S $(VIEWER)
+	@mkdir -p $(@D)
+	$(Q)$(CC) -DPAGE='"$(VIEWER)"' -c -o $@ $<
+
+# ---- the viewer and its decoder ----------------------------------------------------------------------------------------
+
+# As web/wasm/README.md says: no imports, our own small C library, a stack that traps when it overflows. Optimising at link time
+# makes the compressed module 3 % smaller.
+WASM_FLAGS := --target=wasm32 -std=c11 -Oz -flto -mbulk-memory -fvisibility=hidden -ffreestanding -fno-builtin -nostdlib \
+              -ffp-contract=off -ffunction-sections -fdata-sections -DNDEBUG -Wall -Wextra -Werror \
+              -isystem web/wasm/include -Icore -Icodec -Iweb/wasm -MMD -MP
+WASM_LINK := --no-entry --gc-sections --strip-all --stack-first -z stack-size=262144 -O2 --lto-O2 --compress-relocations
+WASM_BUILTINS = $(firstword $(shell find -L $$($(CLANG) -print-resource-dir)/lib -name 'libclang_rt.builtins*wasm32*.a' 2>/dev/null))
+
+.PHONY: wasm web
+wasm: $(WASM) ## the decoder as wasm: build/wasm/lathe.wasm
+web: $(VIEWER) ## the viewer page: web/dist/viewer.html
+
+build/wasm/%.o: %.c
+	@mkdir -p $(@D)
+	@echo "  wasm  $<"
+	$(Q)$(CLANG) $(WASM_FLAGS) -c -o $@ $<
+$(WASM): $(WASM_SOURCES:%.c=build/wasm/%.o)
+	@echo "  link  $@"
+	$(Q)$(WASM_LD) $(WASM_LINK) -o $@ $^ $(WASM_BUILTINS)
+
+web/node_modules/.package-lock.json: web/package-lock.json
+	@echo "  npm   web"
+	$(Q)cd web && npm ci --no-audit --no-fund --loglevel=error && touch node_modules/.package-lock.json
+$(VIEWER): $(WASM) web/node_modules/.package-lock.json web/build.mjs $(wildcard web/src/* web/*.json)
+	@echo "  web   $@"
+	$(Q)cd web && node build.mjs ../$(WASM) ../$(VIEWER)
+
+# ---- demo --------------------------------------------------------------------------------------------------------------
+
+PORT ?= 8080
+BIND ?= 127.0.0.1
+
+.PHONY: demo
+demo: ## install what is missing, bake a brain and an atlas, serve them on http://127.0.0.1:8080/
+	@tests/scripts/setup.sh demo
+	@$(MAKE) --no-print-directory all config=release
+	@BIND=$(BIND) PORT=$(PORT) tests/scripts/demo.sh
+
+# ---- tests -------------------------------------------------------------------------------------------------------------
+
+.PHONY: test test-programs sanitize sanitize-programs fuzz fuzzers bench
+test: ## install what is missing, build, run every test; ends with "N passed, N failed"
+	@tests/scripts/setup.sh test
+	@tests/scripts/run_tests.sh
+
+test-programs: all $(UNIT_TESTS:%=$(B)/tests/%) $(CHECKS:%=$(B)/tests/%) $(B)/tests/make_phantom
+sanitize-programs: $(UNIT_TESTS:%=$(B)/tests/%) $(B)/lathe
+
+sanitize: ## the C tests under AddressSanitizer and UBSan
+	@tests/scripts/run_tests.sh sanitize
+
+fuzz: ## every fuzz target for SECONDS_EACH=10 (see docs/CONTRIBUTING.md)
+	@tests/scripts/run_tests.sh fuzz
+fuzzers: $(FUZZERS:%=$(B)/tests/%)
+
+bench: ## measure the figures of the README (needs python3-vtk9); prints the table
+	@tests/scripts/setup.sh bench
+	@$(MAKE) --no-print-directory all config=release
+	@tests/bench/bench.py
+
+TEST_HELPERS := $(patsubst %.c,$(B)/%.o,$(wildcard tests/phantom.c))
+$(UNIT_TESTS:%=$(B)/tests/%): $(B)/tests/%: $(B)/tests/%.o $(TEST_HELPERS) $(SERVER_LIBRARY) $(LIBRARY)
+	@echo "  link  $@"
+	$(Q)$(CXX) $(LINK_MODE) $(LDFLAGS) -o $@ $^ $(LIBS)
+$(FUZZERS:%=$(B)/tests/%): $(B)/tests/%: $(B)/tests/%.o $(TEST_HELPERS) $(LIBRARY)
+	@echo "  link  $@"
+	$(Q)$(CXX) -fsanitize=fuzzer,address,undefined $(LDFLAGS) -o $@ $^ $(LIBS)
+$(B)/tests/make_phantom: $(B)/tests/make_phantom.o
+	$(Q)$(CC) $(LINK_MODE) $(LDFLAGS) -o $@ $^ -lm
+# CGAL's headers do not compile without warnings.
+$(CHECKS:%=$(B)/tests/%.o): WARNINGS :=
+$(CHECKS:%=$(B)/tests/%): $(B)/tests/%: $(B)/tests/%.o
+	$(Q)$(CXX) $(LINK_MODE) $(LDFLAGS) -o $@ $^ -Wl,--as-needed -ldraco -lgmp -lmpfr -lpthread
+
+# ---- housekeeping ------------------------------------------------------------------------------------------------------
+
+OURS := $(wildcard core/*.[ch] codec/*.[ch] codec/*.cc server/*.[ch] tests/*.[ch] tests/*.cpp web/wasm/*.[ch])
+
+.PHONY: deps format lint help clean FORCE
+deps: ## install what building and testing need (Debian packages, npm packages)
+	@tests/scripts/setup.sh test
+
+format: ## clang-format every C and C++ file
+	clang-format -i $(OURS)
+lint: ## clang-tidy, and the sources compiled by clang with every warning we use
+	clang-tidy --quiet $(CORE) $(CODEC) $(SERVER) server/main.c -- -std=c11 -D_GNU_SOURCE -Icore -Icodec -Iserver -I/usr/include/nifti
+	@for f in $(CORE) $(CODEC) $(SERVER) server/main.c; do \
+	    $(CLANG) -std=c11 -Wall -Wextra -Werror -D_GNU_SOURCE -Icore -Icodec -Iserver -I/usr/include/nifti -fsyntax-only $$f || exit 1; done
+
+help: ## this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@echo "  config=release|debug|sanitize|fuzz chooses the build, objects go to build/<config>/"
+
+clean: ## remove build/ and web/dist/
+	rm -rf build web/dist
+
+FORCE:
+.SECONDARY:
+.DELETE_ON_ERROR:
+-include $(wildcard $(B)/*/*.d $(B)/*/*/*.d build/wasm/*/*.d build/wasm/*/*/*.d)

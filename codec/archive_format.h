@@ -1,0 +1,115 @@
+/* The container of a model: constants and parsers of its records, shared by archives and the decoder. Decoder-safe.
+ * docs/FORMAT.md specifies the bytes:
+ *
+ *   stream = header record, level record 0, level record 1, ...      what a client needs, in the order it needs it
+ *   file   = stream, footer, trailer                                 the rest is for `info` and for finding the levels
+ */
+#ifndef LATHE_ARCHIVE_FORMAT_H
+#define LATHE_ARCHIVE_FORMAT_H
+#include "lathe.h"
+
+#define LATHE_MAGIC_SIZE 8
+#define LATHE_MAGIC_BYTES \
+    { 0x89, 'L', 'T', 'H', 0x0D, 0x0A, 0x1A, LATHE_FORMAT_VERSION }
+enum {
+    LATHE_FORMAT_VERSION = 1,
+    LATHE_LEVEL_TAG = 'L',
+    LATHE_FOOTER_TAG = 'F',
+    LATHE_CRC_SIZE = 4,
+    LATHE_TRAILER_SIZE = 16,
+    LATHE_NAME_MAX = 95, /* bytes of a structure's name */
+    LATHE_MODEL_NAME_MAX = 255,
+    LATHE_MAX_STRUCTURES = 65535,
+    LATHE_MAX_PARAMETERS = 16,
+    LATHE_STRUCTURE_MIN_BYTES = 13,   /* the shortest structure entry of a header */
+    LATHE_LEVEL_STATS_MIN_BYTES = 13, /* the shortest entry of a structure's level in a footer */
+    LATHE_MAX_HEADER_BYTES = 1 << 24,
+    LATHE_MAX_PACKET_BYTES = 1 << 30
+};
+#define LATHE_TRAILER_MAGIC 0x5A48544Cu /* "LTHZ" in file order */
+/* Of the bit mask of one structure: what a decoder may have to allocate for one small packet. 2048 x 2048 x 2048 bits. */
+#define LATHE_MAX_MASK_BYTES (UINT64_C(1) << 30)
+
+/* ---- cursor: checked little-endian reads ---- */
+
+/* Once a read fails, status stays, at stays and every read gives 0: callers read on and look once. */
+typedef struct lathe_reader {
+    const uint8_t *at, *end;
+    lathe_status status; /* OK; MORE: beyond the end; FORMAT, CHECKSUM, ...: fault says what */
+    size_t lacking;      /* with MORE: it is no use to try again with less than so many further bytes */
+    const char *fault;   /* constant text, never NULL */
+} lathe_reader;
+lathe_reader lathe__reader(const uint8_t *bytes, size_t size);
+static inline size_t lathe__reader_left(const lathe_reader *reader) { return (size_t)(reader->end - reader->at); }
+/* Keeps the first failure. Returns it. */
+lathe_status lathe__reader_fail(lathe_reader *reader, lathe_status status, const char *fault);
+const uint8_t *lathe__read_bytes(lathe_reader *reader, size_t size); /* NULL if they are not there */
+uint8_t lathe__read_u8(lathe_reader *reader);
+uint32_t lathe__read_u32(lathe_reader *reader);
+uint64_t lathe__read_u64(lathe_reader *reader);
+float lathe__read_f32(lathe_reader *reader);
+double lathe__read_f64(lathe_reader *reader);
+uint32_t lathe__read_varint(lathe_reader *reader);   /* at most 5 bytes */
+uint64_t lathe__read_varint64(lathe_reader *reader); /* at most 10 bytes */
+static inline int32_t lathe__unzigzag(uint32_t v) { return (int32_t)(v >> 1 ^ (0u - (v & 1))); }
+static inline uint32_t lathe__zigzag(int32_t v) { return (uint32_t)v << 1 ^ (v < 0 ? UINT32_MAX : 0); }
+static inline int64_t lathe__unzigzag64(uint64_t v) { return (int64_t)(v >> 1 ^ (0u - (v & 1))); }
+static inline uint64_t lathe__zigzag64(int64_t v) { return (uint64_t)v << 1 ^ (v < 0 ? UINT64_MAX : 0); }
+
+/* ---- header record ---- */
+
+typedef struct lathe_header_structure {
+    char name[LATHE_NAME_MAX + 1]; /* not empty; the parser does not check that it is UTF-8, lathe_model_open does */
+    uint8_t rgb[3];
+    uint8_t level_count; /* 1 .. LATHE_MAX_LEVELS: it has packets in the records of levels 0 .. level_count - 1 */
+    int64_t label;       /* -1: a threshold */
+    int32_t origin[3], size[3]; /* as in lathe_mask: (u, v, w), margin of one pixel in u and v */
+} lathe_header_structure;
+
+typedef struct lathe_header {
+    lathe_axis axis;
+    lathe_boundary boundary;
+    double affine[3][4]; /* of the volume, file axes: voxel index -> world mm (see lathe__mask_transform) */
+    uint32_t parameter_count;
+    uint32_t parameters[LATHE_MAX_PARAMETERS]; /* of the packets' coding; the container does not interpret them */
+    uint32_t structure_count;
+    uint32_t level_count;               /* the most of any structure */
+    lathe_header_structure *structures; /* owned */
+} lathe_header;
+
+/* Parses the header record at the reader and moves behind it. MORE: not all there (untouched *out; reader->lacking is exact as
+ * soon as the size is there). Allocates at most 12 times the record's size, after the record is complete and its checksum right. */
+lathe_status lathe__header_parse(lathe_header *out, lathe_reader *reader);
+void lathe__header_free(lathe_header *header); /* clears; a zeroed one is fine */
+/* How many structures have a packet in the record of a level. */
+uint32_t lathe__header_present(const lathe_header *header, uint32_t level);
+/* FORMAT or LIMIT and *fault if a field is outside what the format allows. Used by the parser and by the writer. */
+lathe_status lathe__header_check(const lathe_header *header, const char **fault);
+
+/* ---- level record ---- */
+
+/* Structures with level_count > level have one packet each, in the header's order: the payload, then its CRC-32C (4
+ * bytes). */
+typedef struct lathe_level_head {
+    uint32_t level;
+    float error_rms_mm, error_max_mm; /* finite; negative: not measured */
+    uint32_t count;
+    uint32_t *sizes;     /* of the payloads, their checksums not included; owned */
+    uint64_t body_bytes; /* of all packets behind the head, checksums included */
+} lathe_level_head;
+/* Parses the head of a level record and moves behind it, to the first packet. MORE as above. Allocates 4 * count
+ * bytes. */
+lathe_status lathe__level_parse(lathe_level_head *out, lathe_reader *reader, const lathe_header *header);
+void lathe__level_head_free(lathe_level_head *head); /* clears; a zeroed one is fine */
+
+/* A packet's payload, checked: NULL with MORE or CHECKSUM in the reader. */
+const uint8_t *lathe__packet_parse(lathe_reader *reader, uint32_t size);
+
+/* ---- names ---- */
+
+/* Length of the UTF-8 sequence at s (left > 0 bytes are there), or 0: no overlong forms, surrogates, nothing beyond
+ * U+10FFFF. */
+size_t lathe__utf8_length(const uint8_t *s, size_t left);
+/* UTF-8 without control characters, not empty. */
+bool lathe__name_valid(const char *name, size_t size);
+#endif

@@ -1,0 +1,287 @@
+/* The baker: structure by structure to packets, meshes and errors; then the archive, level by level. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "lathe_codec.h"
+#include "mesh.h"
+#include "structure_encode.h"
+
+void lathe_bake_defaults(lathe_bake_options *options) {
+    *options = (lathe_bake_options){.axis = LATHE_AXIS_Z, .boundary = -1, .measure = true, .draco = true};
+}
+
+typedef struct bake {
+    const lathe_volume *volume;
+    const lathe_bake_options *options;
+    lathe_boundary boundary;
+    size_t count;              /* structures */
+    lathe_label_box *boxes;    /* of all labels of the volume */
+    size_t box_count;
+    lathe_header header;
+    lathe_baked_structure *baked;
+    lathe_arena arena[2];
+    double done, total;        /* voxels, for progress */
+    lathe_error *err;
+} bake;
+
+static lathe_status tell(bake *b, const char *stage, double fraction) {
+    const lathe_bake_options *o = b->options;
+    if (o->progress && o->progress(o->progress_context, stage, fraction)) return lathe_fail(b->err, LATHE_ERR_IO, "the bake was cancelled");
+    return LATHE_OK;
+}
+
+static const lathe_label_box *find_box(const bake *b, int64_t label) {
+    for (size_t i = 0; i < b->box_count; i++)
+        if (b->boxes[i].label == label) return &b->boxes[i];
+    return NULL;
+}
+
+static lathe_status extract(bake *b, size_t index, lathe_mask *mask) {
+    const lathe_bake_options *o = b->options;
+    if (!o->structure_count) return lathe__region_threshold(mask, b->volume, o->axis, o->iso, b->err);
+    int64_t label = o->structures[index].label;
+    const lathe_label_box *box = find_box(b, label);
+    if (!box) return lathe_fail(b->err, LATHE_ERR_EMPTY, "label %lld: no voxel has it; the volume has %zu labels", (long long)label, b->box_count);
+    return lathe__region_label_box(mask, b->volume, o->axis, box, b->err);
+}
+
+static float value_at(const bake *b, const int32_t frame[3], int32_t u, int32_t v, int32_t w) {
+    int32_t at[3];
+    at[frame[0]] = u, at[frame[1]] = v, at[frame[2]] = w;
+    for (int k = 0; k < 3; k++)
+        if (at[k] < 0 || at[k] >= b->volume->dims[k]) return b->volume->min;
+    return b->volume->values[((size_t)at[2] * (size_t)b->volume->dims[1] + (size_t)at[1]) * (size_t)b->volume->dims[0] + (size_t)at[0]];
+}
+
+/* Where the grey values cross iso on border edges, on average: one number for the whole structure. Rows and columns of every few
+ * slices are enough. */
+static int mean_fraction(const bake *b, const lathe_mask *mask) {
+    if (b->boundary == LATHE_BOUNDARY_EDGE) return LATHE_FRACTION_ONE / 2;
+    int32_t frame[3], every = mask->size[2] / 24 + 1;
+    lathe__axis_frame(b->options->axis, frame);
+    double sum = 0;
+    size_t count = 0;
+    for (int32_t w = 0; w < mask->size[2]; w += every) {
+        const uint64_t *slice = lathe__mask_slice(mask, w);
+        for (int32_t v = 0; v + 1 < mask->size[1]; v++)
+            for (int32_t i = 0; i < mask->row_words * 2; i++) {
+                /* Even i: border edges along the row; odd: between this row and the next. */
+                const uint64_t *row = slice + (size_t)v * (size_t)mask->row_words + i / 2;
+                uint64_t next = i & 1 ? row[mask->row_words] : row[0] >> 1 | (i / 2 + 1 < mask->row_words ? row[1] << 63 : 0);
+                for (uint64_t change = row[0] ^ next; change; change &= change - 1) {
+                    int32_t u = i / 2 * 64 + __builtin_ctzll(change);
+                    float p = value_at(b, frame, mask->origin[0] + u, mask->origin[1] + v, mask->origin[2] + w);
+                    float q = value_at(b, frame, mask->origin[0] + u + !(i & 1), mask->origin[1] + v + (i & 1), mask->origin[2] + w);
+                    double inside = p >= q ? p : q, outside = p >= q ? q : p;
+                    if (inside > outside) { sum += (inside - b->options->iso) / (inside - outside); count++; }
+                }
+            }
+    }
+    int fraction = count ? (int)(sum / (double)count * LATHE_FRACTION_ONE + 0.5) : LATHE_FRACTION_ONE / 2;
+    return fraction < 8 ? 8 : fraction > 56 ? 56 : fraction;
+}
+
+static size_t sample_count(const bake *b, const lathe_mask *mask) {
+    if (b->options->samples) return b->options->samples;
+    /* One for about eight border edges: denser where there is more surface, so that sums over structures are area-weighted. */
+    size_t borders = 0;
+    for (int32_t w = 0; w < mask->size[2]; w++) {
+        lathe_slice_view view = {.pixels = lathe__mask_slice(mask, w), .width = mask->size[0], .height = mask->size[1], .row_words = mask->row_words};
+        borders += lathe__count_borders(&view);
+    }
+    size_t n = borders / 8;
+    return n < 400 ? 400 : n > 20000 ? 20000 : n;
+}
+
+static int count_bytes(void *context, const void *bytes, size_t size) {
+    (void)bytes;
+    *(uint64_t *)context += size;
+    return 0;
+}
+
+static lathe_status draco_size(uint64_t *out, const lathe_mesh *mesh, const lathe_transform *transform) {
+    struct lathe_world_part part = {0, 0, mesh->vertex_count, 0, mesh->triangle_count};
+    lathe_world_mesh world = {.vertex_count = mesh->vertex_count, .triangle_count = mesh->triangle_count, .structure_count = 1, .parts = &part};
+    world.positions = malloc((size_t)mesh->vertex_count * 3 * sizeof *world.positions);
+    world.indices = malloc((size_t)mesh->triangle_count * 3 * sizeof *world.indices);
+    lathe_status status = LATHE_ERR_MEMORY;
+    if (world.positions && world.indices) {
+        lathe_mesh_positions(mesh, transform, world.positions);
+        lathe_mesh_indices(mesh, transform, world.indices);
+        *out = 0;
+        status = lathe_write_drc(&world, 0, count_bytes, out);
+    }
+    free(world.positions);
+    free(world.indices);
+    return status;
+}
+
+/* Builds each level's mesh as a decoder will, counts and measures it. */
+static lathe_status finish_levels(bake *b, lathe_structure_state *state, lathe_baked_structure *baked, double voxels) {
+    const lathe_bake_options *o = b->options;
+    lathe_reference *reference = NULL;
+    lathe_transform transform = lathe__mask_transform(&state->mask, o->axis, b->volume->affine);
+    lathe_status status = LATHE_OK;
+    size_t samples = o->measure ? sample_count(b, &state->mask) : 0;
+    if (o->measure) status = lathe__reference_build(&reference, b->volume, o->axis, &state->mask, b->boundary, o->iso);
+    for (uint32_t level = 0; !status && level < baked->level_count; level++) {
+        lathe_level_info *info = &baked->levels[level];
+        lathe_surface_counts counts;
+        lathe_mesh mesh = {0};
+        state->level = (int32_t)level;
+        *info = (lathe_level_info){.error_rms_mm = -1, .error_max_mm = -1};
+        status = lathe__state_mesh(&mesh, b->arena, state, &counts, &info->slices);
+        info->rays = counts.rays;
+        info->vertices = mesh.vertex_count;
+        info->triangles = mesh.triangle_count;
+        if (!status && o->measure) {
+            lathe_metrics metrics;
+            status = lathe__reference_measure(&metrics, reference, &mesh, samples);
+            info->error_rms_mm = (float)metrics.rms_mm;
+            info->error_max_mm = (float)metrics.max_mm;
+            baked->area_mm2 = metrics.area_mm2;
+        }
+        if (!status && o->draco) status = draco_size(&info->draco_bytes, &mesh, &transform);
+        lathe_mesh_free(&mesh);
+        b->done += voxels / baked->level_count;
+        if (!status) status = tell(b, o->measure ? "building and measuring" : "building", b->done / b->total);
+    }
+    lathe__reference_free(&reference);
+    return status;
+}
+
+static lathe_status bake_structure(bake *b, size_t index) {
+    lathe_structure_state state = {.level = -1};
+    lathe_baked_structure *baked = &b->baked[index];
+    lathe_header_structure *h = &b->header.structures[index];
+    double voxels = b->options->structure_count ? 1 : b->total;
+    lathe_status status = extract(b, index, &state.mask);
+    if (!status) {
+        state.fraction = mean_fraction(b, &state.mask);
+        if (!b->options->structure_count) b->header.parameters[0] = (uint32_t)state.fraction;
+        status = lathe__structure_encode(baked, &state, b->arena);
+        if (status) lathe_fail(b->err, status, "%s: encoding: %s", h->name, lathe_status_name(status));
+    }
+    if (!status) {
+        h->level_count = (uint8_t)baked->level_count;
+        memcpy(h->origin, state.mask.origin, sizeof h->origin);
+        memcpy(h->size, state.mask.size, sizeof h->size);
+        status = finish_levels(b, &state, baked, voxels);
+        if (status && b->err && !b->err->text[0]) lathe_fail(b->err, status, "%s: building its levels: %s", h->name, lathe_status_name(status));
+    }
+    lathe__state_free(&state);
+    return status;
+}
+
+/* ---- the whole model ---- */
+
+static lathe_level_info sum_levels(const bake *b, uint32_t level) {
+    lathe_level_info sum = {.error_rms_mm = -1, .error_max_mm = -1};
+    double squares = 0, area = 0;
+    for (size_t s = 0; s < b->count; s++) {
+        const lathe_baked_structure *baked = &b->baked[s];
+        const lathe_level_info *l = &baked->levels[level < baked->level_count ? level : baked->level_count - 1];
+        if (l->rays > sum.rays) sum.rays = l->rays;
+        if (l->slices > sum.slices) sum.slices = l->slices;
+        sum.vertices += l->vertices;
+        sum.triangles += l->triangles;
+        sum.draco_bytes += l->draco_bytes;
+        if (l->error_max_mm > sum.error_max_mm) sum.error_max_mm = l->error_max_mm;
+        squares += (double)l->error_rms_mm * (double)l->error_rms_mm * baked->area_mm2;
+        area += baked->area_mm2;
+    }
+    if (area > 0) sum.error_rms_mm = (float)sqrt(squares / area);
+    return sum;
+}
+
+static lathe_status write_levels(bake *b, lathe_archive_writer *writer, const lathe_level_info *levels, lathe_packet *packets) {
+    for (uint32_t level = 0; level < b->header.level_count; level++) {
+        uint32_t n = 0;
+        for (size_t s = 0; s < b->count; s++)
+            if (level < b->baked[s].level_count)
+                packets[n++] = (lathe_packet){b->baked[s].packets[level].data, b->baked[s].packets[level].size};
+        lathe_status status = lathe__archive_level(writer, levels[level].error_rms_mm, levels[level].error_max_mm, packets, n);
+        if (status) return status;
+    }
+    return LATHE_OK;
+}
+
+static lathe_status write_archive(bake *b, lathe_sink sink, void *context) {
+    lathe_archive_writer *writer = NULL;
+    lathe_level_info levels[LATHE_MAX_LEVELS];
+    lathe_packet *packets = calloc(b->count, sizeof *packets);
+    const lathe_level_info **structures = calloc(b->count, sizeof *structures);
+    lathe_status status = packets && structures ? LATHE_OK : LATHE_ERR_MEMORY;
+    if (!status) status = lathe__archive_begin(&writer, &b->header, sink, context, b->err);
+    for (size_t s = 0; !status && s < b->count; s++) {
+        structures[s] = b->baked[s].levels;
+        if (b->baked[s].level_count > b->header.level_count) b->header.level_count = b->baked[s].level_count;
+    }
+    if (!status) {
+        for (uint32_t level = 0; level < b->header.level_count; level++) levels[level] = sum_levels(b, level);
+        status = write_levels(b, writer, levels, packets);
+    }
+    if (!status) {
+        lathe_archive_stats stats = {.name = b->options->name, .iso = b->options->structure_count ? (double)NAN : b->options->iso,
+                                     .levels = levels, .structures = structures};
+        status = lathe__archive_finish(writer, &stats);
+    }
+    lathe__archive_close(&writer);
+    free(packets);
+    free(structures);
+    return status;
+}
+
+static lathe_status prepare(bake *b) {
+    const lathe_bake_options *o = b->options;
+    b->count = o->structure_count ? o->structure_count : 1;
+    b->boundary = o->boundary >= 0 ? (lathe_boundary)o->boundary : o->structure_count ? LATHE_BOUNDARY_EDGE : LATHE_BOUNDARY_ISO;
+    if (b->count > LATHE_MAX_STRUCTURES) return lathe_fail(b->err, LATHE_ERR_LIMIT, "%zu structures: at most %d", b->count, LATHE_MAX_STRUCTURES);
+    b->header.axis = o->axis;
+    b->header.boundary = b->boundary;
+    memcpy(b->header.affine, b->volume->affine, sizeof b->header.affine);
+    b->header.parameter_count = 1;
+    b->header.parameters[0] = LATHE_FRACTION_ONE / 2;
+    b->header.structure_count = (uint32_t)b->count;
+    b->header.structures = calloc(b->count, sizeof *b->header.structures);
+    b->baked = calloc(b->count, sizeof *b->baked);
+    if (!b->header.structures || !b->baked) return lathe_fail(b->err, LATHE_ERR_MEMORY, "out of memory");
+    for (size_t i = 0; i < b->count; i++) {
+        lathe_header_structure *h = &b->header.structures[i];
+        lathe__name_clean(h->name, sizeof h->name, o->structure_count ? o->structures[i].name : o->name ? o->name : "surface");
+        static const uint8_t bone[3] = {222, 205, 180};
+        memcpy(h->rgb, o->structure_count ? o->structures[i].rgb : bone, 3);
+        h->label = o->structure_count ? o->structures[i].label : -1;
+    }
+    b->total = (double)b->count;
+    if (o->structure_count) return lathe__region_labels(&b->boxes, &b->box_count, b->volume, b->err);
+    return LATHE_OK;
+}
+
+lathe_status lathe_bake(const lathe_volume *volume, const lathe_bake_options *options, lathe_sink sink, void *context,
+                        lathe_error *err) {
+    bake b = {.volume = volume, .options = options, .err = err};
+    if (err) err->text[0] = '\0';
+    lathe_status status = prepare(&b);
+    for (size_t i = 0; !status && i < b.count; i++) status = bake_structure(&b, i);
+    if (!status) status = tell(&b, "writing", 1);
+    if (!status) status = write_archive(&b, sink, context);
+    if (status && err && !err->text[0]) lathe_fail(err, status, "writing the archive: %s", lathe_status_name(status));
+    for (size_t i = 0; b.baked && i < b.count; i++) lathe__baked_free(&b.baked[i]);
+    free(b.baked);
+    free(b.header.structures);
+    free(b.boxes);
+    lathe__arena_free(&b.arena[0]);
+    lathe__arena_free(&b.arena[1]);
+    return status;
+}
+
+lathe_status lathe_bake_file(const lathe_volume *volume, const lathe_bake_options *options, const char *path, lathe_error *err) {
+    lathe_atomic_file *file = NULL;
+    lathe_status status = lathe_atomic_open(&file, path, err);
+    if (status) return status;
+    status = lathe_bake(volume, options, lathe_atomic_write, file, err);
+    if (!status) return lathe_atomic_commit(&file, err);
+    lathe_atomic_abandon(&file);
+    return status;
+}

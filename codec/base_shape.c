@@ -1,0 +1,37 @@
+#include "base_shape.h"
+
+int32_t lathe__predict_radius(const lathe_star *star, const lathe_star *parent, uint32_t ray, int32_t start) {
+    int32_t p;
+    if (!parent) p = ray ? star->radius[ray - 1] : start;
+    else {
+        uint32_t same = ray * parent->rays / star->rays;
+        p = parent->radius[same];
+        if (ray) p += (star->radius[ray - 1] - parent->radius[(ray - 1) * parent->rays / star->rays]) / 2;
+    }
+    return p < 1 ? 1 : p > 65535 ? 65535 : p;
+}
+
+lathe_status lathe__star_outline(lathe_outline *out, lathe_arena *arena, const lathe_star_slice *slice, int32_t step, uint32_t seed) {
+    size_t points = 0;
+    for (uint32_t i = 0; i < slice->count; i++) points += slice->stars[i].rays;
+    *out = (lathe_outline){.loop_count = slice->count};
+    out->points = LATHE_NEW(arena, lathe_point, points);
+    out->ray = LATHE_NEW(arena, int32_t, points);
+    out->loops = LATHE_NEW(arena, lathe_loop, slice->count);
+    if (!out->points || !out->ray || !out->loops) return LATHE_ERR_MEMORY;
+    for (uint32_t i = 0; i < slice->count; i++) {
+        const lathe_star *star = &slice->stars[i];
+        lathe_point centre = {star->centre[0] * (LATHE_LATTICE_ONE / 2), star->centre[1] * (LATHE_LATTICE_ONE / 2)};
+        out->loops[i] = (lathe_loop){.first = out->point_count, .count = star->rays, .hole = star->hole, .centre = centre, .rays = star->rays};
+        for (uint32_t k = 0; k < star->rays; k++) {
+            /* Holes have the region on the left, too: their rays go round clockwise. */
+            uint32_t ray = star->hole ? star->rays - 1 - k : k;
+            lathe_point d = lathe__ray_direction(ray, star->rays), at;
+            at.x = centre.x + (int32_t)((int64_t)star->radius[ray] * step * d.x / LATHE_RAY_LENGTH);
+            at.y = centre.y + (int32_t)((int64_t)star->radius[ray] * step * d.y / LATHE_RAY_LENGTH);
+            out->ray[out->point_count] = (int32_t)ray;
+            out->points[out->point_count++] = lathe__jitter((lathe_point){at.x & ~1, at.y & ~1}, seed);
+        }
+    }
+    return LATHE_OK;
+}

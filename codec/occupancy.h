@@ -1,0 +1,22 @@
+/* Occupancy of a slice, coded with contexts of the slices already known. The heart of the polar stream's levels 1..N. */
+#ifndef LATHE_OCCUPANCY_H
+#define LATHE_OCCUPANCY_H
+#include "lathe.h"
+#include "range_coder.h"
+
+/* What is known when a slice is coded. All slices have the same size: rows x row_words words, margin of one empty pixel.
+ * NULL: not known (treat as unknown, not as empty). gap: distance in slices. */
+typedef struct lathe_known {
+    const uint64_t *below, *above;      /* nearest known slices on either side */
+    int32_t gap_below, gap_above;
+    const uint64_t *below2, *above2;    /* the next ones beyond them, or NULL */
+} lathe_known;
+
+typedef struct lathe_occupancy lathe_occupancy;    /* adaptive state; one per structure, kept over its levels */
+lathe_status lathe__occupancy_new(lathe_occupancy **out, int32_t width, int32_t height);   /* pixels, margin included */
+void lathe__occupancy_free(lathe_occupancy **state);
+lathe_status lathe__occupancy_encode(lathe_occupancy *state, lathe_range_encoder *e, const uint64_t *slice,
+                                     const lathe_known *known);
+/* slice: cleared and written; the margin always comes out empty whatever the bytes are. */
+lathe_status lathe__occupancy_decode(lathe_occupancy *state, lathe_range_decoder *d, uint64_t *slice, const lathe_known *known);
+#endif

@@ -1,0 +1,28 @@
+/* Adaptive binary range coder: 32-bit low/range as in LZMA (the encoder propagates carries), 16-bit probabilities. Encoder and
+ * decoder share only this header.
+ *
+ * A bit with P(1) = p1 / 65536 splits the range at bound = range * p1 / 65536 (64-bit product, rounded down); 1 takes the part
+ * below. Both sides renormalise to range >= 2^24, so that bound is at least 256 and less than range for every legal p1. */
+#ifndef LATHE_RANGE_CODER_H
+#define LATHE_RANGE_CODER_H
+#include "lathe.h"
+
+/* ---- encoder ---- */
+typedef struct lathe_range_encoder {
+    uint8_t *bytes; size_t size, capacity;    /* owned */
+    uint64_t low; uint32_t range; uint8_t cache; uint64_t pending;
+    bool failed;                               /* an allocation failed: what was written is useless */
+} lathe_range_encoder;
+void lathe__encoder_start(lathe_range_encoder *e);
+/* Codes bit with P(bit = 1) = p1 / 65536, 1 <= p1 <= 65535. */
+void lathe__encode_bit(lathe_range_encoder *e, uint32_t p1, int bit);
+/* Ends the stream with the fewest bytes; the decoder reads zeros beyond the end. */
+void lathe__encoder_finish(lathe_range_encoder *e);
+void lathe__encoder_free(lathe_range_encoder *e);
+
+/* ---- decoder ---- */
+typedef struct lathe_range_decoder { const uint8_t *at, *end; uint32_t code, range; uint32_t overrun; } lathe_range_decoder;
+/* Reads zeros beyond the end; overrun counts them: more than 8 means that the packet was truncated or damaged. */
+void lathe__decoder_start(lathe_range_decoder *d, const uint8_t *bytes, size_t size);
+int lathe__decode_bit(lathe_range_decoder *d, uint32_t p1);
+#endif

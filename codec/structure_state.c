@@ -1,0 +1,81 @@
+#include "structure_state.h"
+#include <stdlib.h>
+
+void lathe__state_free(lathe_structure_state *state) {
+    lathe__mask_free(&state->mask);
+    free((void *)(uintptr_t)state->plan.kept);
+    state->plan.kept = NULL;
+    lathe__arena_free(&state->arena);
+    lathe__occupancy_free(&state->occupancy);
+}
+
+static bool contains(const int32_t *list, uint32_t count, int32_t w) {
+    uint32_t low = 0, high = count;
+    while (low < high) {
+        uint32_t middle = (low + high) / 2;
+        if (list[middle] < w) low = middle + 1;
+        else high = middle;
+    }
+    return low < count && list[low] == w;
+}
+
+/* A slice is known to a later one of the same level if it lies below: levels are coded upwards. */
+lathe_status lathe__new_slices(lathe_new_slice **out, uint32_t *count, lathe_arena *arena, const lathe_structure_state *state,
+                               uint32_t level) {
+    int32_t *now, *before = NULL;
+    uint32_t now_count, before_count = 0, n = 0;
+    lathe_status status = lathe__level_slices(&now, &now_count, arena, &state->plan, level);
+    if (!status && level > 1) status = lathe__level_slices(&before, &before_count, arena, &state->plan, level - 1);
+    if (status) return status;
+    lathe_new_slice *list = LATHE_NEW(arena, lathe_new_slice, now_count);
+    if (!list) return LATHE_ERR_MEMORY;
+    for (uint32_t i = 0; i < now_count; i++) {
+        if (contains(before, before_count, now[i])) continue;
+        lathe_new_slice *s = &list[n++];
+        *s = (lathe_new_slice){.slice = now[i]};
+        if (i > 0) { s->known.below = lathe__mask_slice(&state->mask, now[i - 1]); s->known.gap_below = now[i] - now[i - 1]; }
+        if (i > 1) s->known.below2 = lathe__mask_slice(&state->mask, now[i - 2]);
+        uint32_t above = 0;
+        for (uint32_t k = i + 1; k < now_count && above < 2; k++) {
+            if (!contains(before, before_count, now[k])) continue;
+            if (above++) s->known.above2 = lathe__mask_slice(&state->mask, now[k]);
+            else { s->known.above = lathe__mask_slice(&state->mask, now[k]); s->known.gap_above = now[k] - now[i]; }
+        }
+    }
+    *out = list;
+    *count = n;
+    return LATHE_OK;
+}
+
+static lathe_status base_mesh(lathe_mesh *out, lathe_arena arena[2], const lathe_structure_state *state, const int32_t *slices,
+                              uint32_t count, lathe_surface_counts *counts) {
+    int32_t step = lathe__radius_step(lathe__level_stride(&state->plan, 0));
+    lathe_outline *outlines = LATHE_NEW(&arena[0], lathe_outline, count);
+    if (!outlines) return LATHE_ERR_MEMORY;
+    for (uint32_t i = 0; i < count; i++) {
+        lathe_status status = lathe__star_outline(&outlines[i], &arena[0], &state->base[i], step, i);
+        if (status) return status;
+        for (uint32_t k = 0; k < state->base[i].count; k++)
+            if (state->base[i].stars[k].rays > counts->rays) counts->rays = state->base[i].stars[k].rays;
+        counts->contour_vertices += outlines[i].point_count;
+    }
+    return lathe__stack_outlines(out, &arena[1], outlines, slices, count, false, counts);
+}
+
+lathe_status lathe__state_mesh(lathe_mesh *out, lathe_arena arena[2], const lathe_structure_state *state,
+                               lathe_surface_counts *counts, uint32_t *shown) {
+    int32_t *slices;
+    *counts = (lathe_surface_counts){0};
+    if (state->level < 0) return LATHE_ERR_RANGE;
+    lathe_arena list = {0};
+    lathe_status status = lathe__level_slices(&slices, shown, &list, &state->plan, (uint32_t)state->level);
+    if (!status) {
+        if (state->level == 0) status = base_mesh(out, arena, state, slices, *shown, counts);
+        else status = lathe__build_surface(out, arena, &state->mask, slices, *shown, state->fraction,
+                                           state->plan.level_count - 1 - (uint32_t)state->level, counts);
+    }
+    lathe__arena_reset(&arena[0]);
+    lathe__arena_reset(&arena[1]);
+    lathe__arena_free(&list);
+    return status;
+}

@@ -1,0 +1,115 @@
+#include "level.h"
+#include <stdlib.h>
+#include <string.h>
+
+uint32_t lathe__choose_levels(int32_t slices) {
+    uint32_t levels = 2;
+    while (levels < LATHE_MAX_LEVELS && slices >= 10 << (levels - 1)) levels++;
+    return levels;
+}
+
+lathe_status lathe__level_slices(int32_t **out, uint32_t *count, lathe_arena *arena, const lathe_level_plan *plan, uint32_t level) {
+    int32_t stride = lathe__level_stride(plan, level);
+    int32_t *list = LATHE_NEW(arena, int32_t, (size_t)plan->slices / (size_t)stride + plan->kept_count + 2);
+    if (!list) return LATHE_ERR_MEMORY;
+    uint32_t n = 0, kept = 0;
+    for (int32_t w = 0;; w += stride) {
+        int32_t regular = w < plan->slices - 1 ? w : plan->slices - 1;
+        while (kept < plan->kept_count && plan->kept[kept] <= regular) {
+            if (plan->kept[kept] < regular && (!n || plan->kept[kept] > list[n - 1])) list[n++] = plan->kept[kept];
+            kept++;
+        }
+        if (!n || list[n - 1] < regular) list[n++] = regular;
+        if (regular == plan->slices - 1) break;
+    }
+    *out = list;
+    *count = n;
+    return LATHE_OK;
+}
+
+uint32_t lathe__choose_rays(int64_t reach, uint32_t coarseness) {
+    uint32_t cap = 8;
+    /* 2 pi reach in voxels, rounded up to a power of two. */
+    while (cap < 65536 && (int64_t)cap * LATHE_LATTICE_ONE < reach * 44 / 7) cap *= 2;
+    uint32_t rays = coarseness < 16 ? cap >> coarseness : 0;
+    return rays < 8 ? 8 : rays;
+}
+
+lathe_status lathe__stack_outlines(lathe_mesh *out, lathe_arena *scratch, const lathe_outline *outlines, const int32_t *heights,
+                                   uint32_t count, bool lattice, lathe_surface_counts *counts) {
+    static const lathe_outline air = {0};
+    lathe_mesh_builder builder = {0};
+    size_t points = 0;
+    for (uint32_t i = 0; i < count; i++) points += outlines[i].point_count;
+    lathe_status status = lathe__builder_reserve(&builder, points + points / 4, points * 5 / 2);
+    uint32_t base = 0;
+    for (uint32_t i = 0; !status && i < count; i++)
+        for (uint32_t j = 0; j < outlines[i].point_count; j++) {
+            int32_t *v = builder.mesh.lattice[builder.mesh.vertex_count++];
+            v[0] = outlines[i].points[j].x, v[1] = outlines[i].points[j].y, v[2] = heights[i] * LATHE_LATTICE_ONE;
+        }
+    for (uint32_t i = 0; !status && i <= count; i++) {
+        uint32_t above = i ? base + outlines[i - 1].point_count : 0;
+        lathe_slab slab = {.outline = {i ? &outlines[i - 1] : &air, i < count ? &outlines[i] : &air},
+                           .height = {(i ? heights[i - 1] : heights[0] - 1) * LATHE_LATTICE_ONE,
+                                      (i < count ? heights[i] : heights[count - 1] + 1) * LATHE_LATTICE_ONE},
+                           .base = {base, above}, .cap = LATHE_LATTICE_ONE / 2, .lattice = lattice};
+        status = lathe__overlay_slab(&builder, scratch, &slab, &counts->overlay);
+        base = above;
+        lathe__arena_reset(scratch);
+    }
+    if (status) {
+        lathe_mesh_free(&builder.mesh);
+        return status;
+    }
+    *out = builder.mesh;
+    return LATHE_OK;
+}
+
+/* A whole loop has as many rays as meet every vertex: the cap. */
+static uint32_t rays_of_whole_loop(const lathe_outline *outline, const lathe_loop *loop) {
+    const lathe_point *p = outline->points + loop->first;
+    lathe_point low = p[0], high = p[0];
+    for (uint32_t i = 1; i < loop->count; i++) {
+        if (p[i].x < low.x) low.x = p[i].x;
+        if (p[i].x > high.x) high.x = p[i].x;
+        if (p[i].y < low.y) low.y = p[i].y;
+        if (p[i].y > high.y) high.y = p[i].y;
+    }
+    int64_t dx = (high.x - low.x) / 2, dy = (high.y - low.y) / 2;
+    return lathe__choose_rays(dx > dy ? dx : dy, 0);
+}
+
+lathe_status lathe__build_surface(lathe_mesh *out, lathe_arena arena[2], const lathe_mask *mask, const int32_t *slices,
+                                  uint32_t count, int fraction, uint32_t coarseness, lathe_surface_counts *counts) {
+    lathe_arena *keep = &arena[0], *scratch = &arena[1];
+    lathe_outline *outlines = LATHE_NEW(keep, lathe_outline, count);
+    if (!outlines) return LATHE_ERR_MEMORY;
+    for (uint32_t i = 0; i < count; i++) {
+        lathe_slice_view view = {.pixels = lathe__mask_slice(mask, slices[i]),
+                                 .below = i ? lathe__mask_slice(mask, slices[i - 1]) : NULL,
+                                 .above = i + 1 < count ? lathe__mask_slice(mask, slices[i + 1]) : NULL,
+                                 .width = mask->size[0], .height = mask->size[1], .row_words = mask->row_words,
+                                 .parity = (int)(i & 1), .fraction = fraction};
+        int32_t *border;
+        lathe_status status;
+        if (coarseness) {
+            lathe_outline loops;
+            status = lathe__trace_outline(&loops, &border, scratch, &view);
+            if (!status) status = lathe__refine_outline(&outlines[i], keep, &loops, coarseness, i);
+            lathe__arena_reset(scratch);
+        } else {
+            status = lathe__trace_outline(&outlines[i], &border, keep, &view);
+        }
+        if (status) return status;
+        counts->contour_vertices += outlines[i].point_count;
+        for (uint32_t l = 0; l < outlines[i].loop_count; l++) {
+            lathe_loop *loop = &outlines[i].loops[l];
+            if (!coarseness) loop->rays = rays_of_whole_loop(&outlines[i], loop);
+            if (loop->rays > counts->rays) counts->rays = loop->rays;
+        }
+    }
+    lathe_status status = lathe__stack_outlines(out, scratch, outlines, slices, count, !coarseness, counts);
+    lathe__arena_reset(keep);
+    return status;
+}

@@ -1,0 +1,52 @@
+/* Levels: which slices a level shows, how many rays its loops cast, and the surface that results. Decoder-safe. */
+#ifndef LATHE_LEVEL_H
+#define LATHE_LEVEL_H
+#include "mask.h"
+#include "outline.h"
+#include "overlay.h"
+
+/* A structure of `slices` slices has level_count levels. Level n shows every 2^(level_count - 1 - n)-th slice, the first and the
+ * last, and the kept ones (first and last slices of large components). */
+typedef struct lathe_level_plan {
+    int32_t slices;
+    uint32_t level_count;
+    const int32_t *kept;       /* ascending, within 0 .. slices - 1 */
+    uint32_t kept_count;
+} lathe_level_plan;
+
+/* As many levels as leave the base shape at least about five slices; 2 .. LATHE_MAX_LEVELS. */
+uint32_t lathe__choose_levels(int32_t slices);
+static inline int32_t lathe__level_stride(const lathe_level_plan *plan, uint32_t level) {
+    return (int32_t)1 << (plan->level_count - 1 - level);
+}
+/* The shown slices, ascending; *out is arena memory. */
+lathe_status lathe__level_slices(int32_t **out, uint32_t *count, lathe_arena *arena, const lathe_level_plan *plan, uint32_t level);
+
+/* Rays of a loop whose farthest vertex is `reach` lattice units from its centre: half as many for each level below the last
+ * (coarseness), at least 8. The cap is reached at coarseness 0: neighbouring crossings are then at most one voxel apart. */
+uint32_t lathe__choose_rays(int64_t reach, uint32_t coarseness);
+
+/* refinement.c: the contour of a level: of each loop the vertices next to the crossings of its rays. A contour that would cross
+ * itself or another one, or change sides with it, is refined by further vertices of its loop until it does not [H: expansion].
+ * Vertices move by under 1/100 voxel (seed), so that no vertex lies on a line through two others. */
+lathe_status lathe__refine_outline(lathe_outline *out, lathe_arena *arena, const lathe_outline *loops, uint32_t coarseness,
+                                   uint32_t seed);
+lathe_point lathe__jitter(lathe_point p, uint32_t seed);
+/* True if no two edges of the outline meet, loops are as nested as orientation says, and every loop has three vertices. */
+lathe_status lathe__outline_is_simple(bool *simple, lathe_arena *arena, const lathe_outline *outline);
+
+/* What a stack of outlines became. */
+typedef struct lathe_surface_counts {
+    lathe_overlay_counts overlay;
+    uint32_t rays;             /* most rays of any loop */
+    uint64_t contour_vertices, unfolded;   /* vertices of all contours; those added to keep contours simple */
+} lathe_surface_counts;
+
+/* Closes a stack of outlines: slab by slab, air below the first and above the last. heights: slice numbers. */
+lathe_status lathe__stack_outlines(lathe_mesh *out, lathe_arena *scratch, const lathe_outline *outlines, const int32_t *heights,
+                                   uint32_t count, bool lattice, lathe_surface_counts *counts);
+
+/* The surface of an exact level (n >= 1): slices of the mask traced, cast and stacked. coarseness = level_count - 1 - level. */
+lathe_status lathe__build_surface(lathe_mesh *out, lathe_arena arena[2], const lathe_mask *mask, const int32_t *slices,
+                                  uint32_t count, int fraction, uint32_t coarseness, lathe_surface_counts *counts);
+#endif

@@ -1,0 +1,260 @@
+/* Self-intersections: a tree of boxes finds the pairs, exact predicates decide. */
+#include "mesh_intersect.h"
+#include "box_tree.h"
+
+__extension__ typedef __int128 int128;
+typedef const int32_t *point;              /* three lattice coordinates */
+
+static int sign128(int128 x) { return (x > 0) - (x < 0); }
+static int sign64(int64_t x) { return (x > 0) - (x < 0); }
+
+/* Differences of int32 have 33 bits: minors have 67, the determinant 102. */
+static int orient3d_exact(const int64_t a[3], const int64_t b[3], const int64_t c[3]) {
+    int128 x = (int128)b[1] * c[2] - (int128)b[2] * c[1];
+    int128 y = (int128)b[2] * c[0] - (int128)b[0] * c[2];
+    int128 z = (int128)b[0] * c[1] - (int128)b[1] * c[0];
+    return sign128(a[0] * x + a[1] * y + a[2] * z);
+}
+
+/* The differences are exact doubles, so each of the six triple products errs by at most (1 + 2^-53)^5 - 1 of its size
+ * (product, minor, product, two sums): 8 * 2^-53 of the sum of their sizes covers it, and the rounding of that sum too. */
+static int orient3d_filtered(const int64_t a[3], const int64_t b[3], const int64_t c[3]) {
+    double p[3], size = 0, det = 0;
+    for (int i = 0; i < 3; i++) {
+        int j = i == 2 ? 0 : i + 1, k = 3 - i - j;
+        double f = (double)b[j] * (double)c[k], g = (double)b[k] * (double)c[j];
+        p[i] = (double)a[i] * (f - g);
+        size += fabs((double)a[i]) * (fabs(f) + fabs(g));
+    }
+    det = (p[0] + p[1]) + p[2];
+    if (fabs(det) > 0x1p-50 * size) return det > 0 ? 1 : -1;
+    return orient3d_exact(a, b, c);
+}
+
+int lathe__orient3d(point a, point b, point c, point d) {
+    int64_t p[3], q[3], r[3];
+    uint64_t bits = 0;
+    for (int i = 0; i < 3; i++) {
+        p[i] = (int64_t)a[i] - d[i];
+        q[i] = (int64_t)b[i] - d[i];
+        r[i] = (int64_t)c[i] - d[i];
+        bits |= (uint64_t)(p[i] ^ p[i] >> 63) | (uint64_t)(q[i] ^ q[i] >> 63) | (uint64_t)(r[i] ^ r[i] >> 63);
+    }
+    /* Within 16 voxels, as nearly always: minors below 2^41, three products below 2^61. */
+    if (bits >> 20) return orient3d_filtered(p, q, r);
+    return sign64(p[0] * (q[1] * r[2] - q[2] * r[1]) + p[1] * (q[2] * r[0] - q[0] * r[2]) +
+                  p[2] * (q[0] * r[1] - q[1] * r[0]));
+}
+
+/* Sign of the area of a, b, c in the plane of the axes i and j. */
+static int orient2d(point a, point b, point c, int i, int j) {
+    int64_t x = (int64_t)b[i] - a[i], y = (int64_t)b[j] - a[j], z = (int64_t)c[i] - a[i], t = (int64_t)c[j] - a[j];
+    return sign128((int128)x * t - (int128)y * z);
+}
+
+bool lathe__triangle_degenerate(point a, point b, point c) {
+    for (int i = 0; i < 3; i++) {
+        int j = (i + 1) % 3;
+        uint64_t x = (uint64_t)((int64_t)b[i] - a[i]), y = (uint64_t)((int64_t)b[j] - a[j]);
+        uint64_t z = (uint64_t)((int64_t)c[i] - a[i]), t = (uint64_t)((int64_t)c[j] - a[j]);
+        /* Not 0 modulo 2^64 is not 0; only the rest needs 128 bits. */
+        if (x * t != y * z || orient2d(a, b, c, i, j) != 0) return false;
+    }
+    return true;
+}
+
+/* ---- coplanar: in the projection along an axis where the triangle keeps its area ---- */
+
+typedef struct plane { int i, j; } plane;
+
+static plane projection(point a, point b, point c) {
+    for (int i = 0; i < 2; i++)
+        if (orient2d(a, b, c, i, i + 1)) return (plane){i, i + 1};
+    return (plane){2, 0};
+}
+
+static bool between(point s, point t, point p, plane in) {
+    for (int k = 0; k < 2; k++) {
+        int i = k ? in.j : in.i;
+        int32_t low = s[i] < t[i] ? s[i] : t[i], high = s[i] < t[i] ? t[i] : s[i];
+        if (p[i] < low || p[i] > high) return false;
+    }
+    return true;
+}
+
+static bool segments_meet(point a, point b, point c, point d, plane in) {
+    int oc = orient2d(a, b, c, in.i, in.j), od = orient2d(a, b, d, in.i, in.j);
+    int oa = orient2d(c, d, a, in.i, in.j), ob = orient2d(c, d, b, in.i, in.j);
+    if (oc * od < 0 && oa * ob < 0) return true;
+    return (!oc && between(a, b, c, in)) || (!od && between(a, b, d, in)) || (!oa && between(c, d, a, in)) ||
+           (!ob && between(c, d, b, in));
+}
+
+static bool triangle_holds(point a, point b, point c, point p, plane in) {
+    int x = orient2d(a, b, p, in.i, in.j), y = orient2d(b, c, p, in.i, in.j), z = orient2d(c, a, p, in.i, in.j);
+    return (x >= 0 && y >= 0 && z >= 0) || (x <= 0 && y <= 0 && z <= 0);
+}
+
+static bool coplanar_segment_meets(point s, point t, const point q[3]) {
+    plane in = projection(q[0], q[1], q[2]);
+    if (triangle_holds(q[0], q[1], q[2], s, in)) return true;
+    return segments_meet(s, t, q[0], q[1], in) || segments_meet(s, t, q[1], q[2], in) || segments_meet(s, t, q[2], q[0], in);
+}
+
+/* ---- in space ---- */
+
+/* The closed segment s, t and the closed triangle q; os and ot are the sides of q's plane that s and t lie on. */
+static bool segment_meets(point s, point t, int os, int ot, const point q[3]) {
+    if (os * ot > 0) return false;
+    if (!os && !ot) return coplanar_segment_meets(s, t, q);
+    int x = lathe__orient3d(s, t, q[0], q[1]), y = lathe__orient3d(s, t, q[1], q[2]);
+    if (x * y < 0) return false;
+    int z = lathe__orient3d(s, t, q[2], q[0]);
+    return x * z >= 0 && y * z >= 0;
+}
+
+static bool sides(int side[3], const point p[3], const point q[3]) {
+    for (int k = 0; k < 3; k++) side[k] = lathe__orient3d(q[0], q[1], q[2], p[k]);
+    return !((side[0] > 0 && side[1] > 0 && side[2] > 0) || (side[0] < 0 && side[1] < 0 && side[2] < 0));
+}
+
+/* No shared corner: two triangles meet just when an edge of one meets the other. */
+static bool apart_meet(const point p[3], const point q[3]) {
+    int ps[3], qs[3];
+    if (!sides(ps, p, q) || !sides(qs, q, p)) return false;
+    for (int k = 0; k < 3; k++) {
+        int l = k == 2 ? 0 : k + 1;
+        if (segment_meets(p[k], p[l], ps[k], ps[l], q) || segment_meets(q[k], q[l], qs[k], qs[l], p)) return true;
+    }
+    return false;
+}
+
+/* Corner 0 of both is shared. What they share beyond it reaches along a ray from it to the opposite edge of one of them. */
+static bool at_corner_meet(const point p[3], const point q[3]) {
+    int p1 = lathe__orient3d(q[0], q[1], q[2], p[1]), p2 = lathe__orient3d(q[0], q[1], q[2], p[2]);
+    if (p1 * p2 > 0) return false;
+    int q1 = lathe__orient3d(p[0], p[1], p[2], q[1]), q2 = lathe__orient3d(p[0], p[1], p[2], q[2]);
+    if (q1 * q2 > 0) return false;
+    return segment_meets(p[1], p[2], p1, p2, q) || segment_meets(q[1], q[2], q1, q2, p);
+}
+
+/* Edge a, b is shared: they overlap when c and d lie in one plane, on one side. */
+static bool at_edge_meet(point a, point b, point c, point d) {
+    if (lathe__orient3d(a, b, c, d)) return false;
+    plane in = projection(a, b, c);
+    return orient2d(a, b, c, in.i, in.j) == orient2d(a, b, d, in.i, in.j);
+}
+
+static bool triangles_meet(const lathe_mesh *mesh, uint32_t first, uint32_t second) {
+    const uint32_t *s = mesh->triangles[first], *t = mesh->triangles[second];
+    int shared = 0, at_s[3] = {0}, at_t[3] = {0};
+    for (int k = 0; k < 3; k++)
+        for (int l = 0; l < 3; l++)
+            if (s[k] == t[l]) {
+                at_s[shared] = k;
+                at_t[shared++] = l;
+            }
+    if (shared == 3) return true;
+    point p[3], q[3];
+    int k = at_s[0], l = at_t[0];
+    if (shared == 2) {
+        k = 3 - at_s[0] - at_s[1];
+        l = 3 - at_t[0] - at_t[1];
+    }
+    for (int i = 0; i < 3; i++) {
+        p[i] = mesh->lattice[s[(k + i) % 3]];
+        q[i] = mesh->lattice[t[(l + i) % 3]];
+    }
+    return shared == 2 ? at_edge_meet(p[1], p[2], p[0], q[0]) : shared == 1 ? at_corner_meet(p, q) : apart_meet(p, q);
+}
+
+/* ---- all pairs whose boxes touch ---- */
+
+typedef struct join {
+    const lathe_mesh *mesh;
+    const lathe_box_tree *tree;
+    const uint32_t *order;     /* triangle of each item */
+    uint64_t found;
+} join;
+
+static int touching(const lathe_box_node *a, int child, const lathe_box_node *b) {
+    lathe_i4 mask = {-1, -1, -1, -1};
+    for (int i = 0; i < 3; i++) {
+        lathe_f4 low = lathe__f4(((const float *)&a->low[i])[child]), high = lathe__f4(((const float *)&a->high[i])[child]);
+        mask &= (lathe_i4)(low <= b->high[i]) & (lathe_i4)(high >= b->low[i]);
+    }
+    return lathe__bits4(mask);
+}
+
+/* Pairs of items below node a and node b >= a of one level; each once. */
+static void join_nodes(join *j, uint32_t level, size_t a, size_t b) {
+    const lathe_box_node *nodes = j->tree->nodes + j->tree->first[level];
+    for (int i = 0; i < 4; i++) {
+        int hits = touching(&nodes[a], i, &nodes[b]);
+        if (a == b) hits &= level ? 15 << i : 14 << i;
+        for (int k = 0; k < 4; k++) {
+            if (!(hits >> k & 1)) continue;
+            size_t first = 4 * a + (size_t)i, second = 4 * b + (size_t)k;
+            if (level) join_nodes(j, level - 1, first, second);
+            else j->found += triangles_meet(j->mesh, j->order[first], j->order[second]);
+        }
+    }
+}
+
+static bool is_sound(const lathe_mesh *mesh, const uint32_t t[3]) {
+    uint32_t n = mesh->vertex_count;
+    return t[0] < n && t[1] < n && t[2] < n &&
+           !lathe__triangle_degenerate(mesh->lattice[t[0]], mesh->lattice[t[1]], mesh->lattice[t[2]]);
+}
+
+/* Rounding to float is monotone: boxes that touch on the lattice still touch. */
+static lathe_box triangle_box(const lathe_mesh *mesh, const uint32_t t[3]) {
+    lathe_box box = lathe__box_empty();
+    for (int k = 0; k < 3; k++) {
+        const int32_t *p = mesh->lattice[t[k]];
+        lathe__box_add(&box, (float[3]){(float)p[0], (float)p[1], (float)p[2]});
+    }
+    return box;
+}
+
+static lathe_curve box_middles(const lathe_mesh *mesh, const uint32_t *sound, float (*middle)[3], uint32_t count) {
+    lathe_box all = lathe__box_empty();
+    for (uint32_t k = 0; k < count; k++) {
+        lathe_box box = triangle_box(mesh, mesh->triangles[sound[k]]);
+        for (int i = 0; i < 3; i++) middle[k][i] = (box.low[i] + box.high[i]) / 2;
+        lathe__box_add(&all, middle[k]);
+    }
+    return lathe__curve_through(&all);
+}
+
+lathe_status lathe__mesh_intersections(uint64_t *out, const lathe_mesh *mesh) {
+    size_t n = mesh->triangle_count;
+    lathe_status status = LATHE_ERR_MEMORY;
+    lathe_box_tree tree = {0};
+    uint32_t count = 0, *sound = malloc((n + 1) * sizeof *sound), *order = malloc((n + 1) * sizeof *order);
+    float(*middle)[3] = malloc((n + 1) * sizeof *middle);
+    lathe_box *boxes = malloc((n + 1) * sizeof *boxes);
+    if (!sound || !order || !middle || !boxes) goto cleanup;
+    for (uint32_t k = 0; k < n; k++)
+        if (is_sound(mesh, mesh->triangles[k])) sound[count++] = k;
+    join j = {mesh, &tree, order, 0};
+    if (count) {
+        lathe_curve curve = box_middles(mesh, sound, middle, count);
+        if ((status = lathe__curve_order(order, NULL, (const float(*)[3])middle, count, &curve)) != LATHE_OK) goto cleanup;
+        for (uint32_t k = 0; k < count; k++) {
+            order[k] = sound[order[k]];
+            boxes[k] = triangle_box(mesh, mesh->triangles[order[k]]);
+        }
+        if ((status = lathe__box_tree_build(&tree, boxes, count)) != LATHE_OK) goto cleanup;
+        join_nodes(&j, tree.level_count - 1, 0, 0);
+    }
+    *out = j.found;
+    status = LATHE_OK;
+cleanup:
+    free(sound);
+    free(order);
+    free(middle);
+    free(boxes);
+    lathe__box_tree_free(&tree);
+    return status;
+}

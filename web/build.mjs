@@ -1,0 +1,53 @@
+// Builds the viewer: node build.mjs [DECODER.wasm [VIEWER.html]]. One page with style, script and decoder in it.
+import { build, transform } from 'esbuild';
+import { mkdir, readFile, writeFile } from 'node:fs/promises';
+import { dirname } from 'node:path';
+import { fileURLToPath } from 'node:url';
+
+const here = (path) => fileURLToPath(new URL(path, import.meta.url));
+const [wasmPath = here('../build/wasm/lathe.wasm'), pagePath = here('dist/viewer.html')] = process.argv.slice(2);
+
+/** Shaders without comments and needless space; preprocessor lines keep their line ends. */
+const shaders = {
+    name: 'glsl',
+    setup({ onLoad }) {
+        onLoad({ filter: /\.glsl$/ }, async ({ path }) => ({
+            loader: 'text',
+            contents: (await readFile(path, 'utf8'))
+                .replace(/\/\/.*/g, '')
+                .replace(/^(#.*)\n|\s+/gm, (_, line) => (line ? line + '\0' : ' '))
+                .replace(/ ?([^\w\s#.\0]) ?/g, '$1')
+                .replace(/\0 ?/g, '\n')
+                .trim(),
+        }));
+    },
+};
+
+/**
+ * Bytes as characters of the same number: brotli then sees bytes where base64 would show it none. NUL, CR and < would not
+ * come through an HTML parser, so they go 256 higher; the page takes each character's low eight bits.
+ */
+const textOfBytes = (bytes) =>
+    Array.from(bytes, (b) => String.fromCharCode(b === 0 || b === 13 || b === 60 ? b + 256 : b)).join('');
+
+const bundle = await build({
+    entryPoints: [here('src/main.ts')],
+    bundle: true,
+    minify: true,
+    format: 'iife',
+    target: 'es2022',
+    write: false,
+    charset: 'utf8',
+    legalComments: 'none',
+    plugins: [shaders],
+});
+const script = bundle.outputFiles[0].text.trim();
+if (/<\/script|<!--/i.test(script)) throw Error('the script would end its own element');
+
+const style = (await transform(await readFile(here('src/style.css'), 'utf8'), { loader: 'css', minify: true })).code.trim();
+const parts = { STYLE: style, SCRIPT: script, WASM: textOfBytes(await readFile(wasmPath)) };
+const template = (await readFile(here('src/page.html'), 'utf8')).replace(/>\s+</g, '><').replace(/\s+/g, ' ').trim();
+const page = template.replace(/\/\*([A-Z]+)\*\//g, (_, part) => parts[part]);
+
+await mkdir(dirname(pagePath), { recursive: true });
+await writeFile(pagePath, page);
