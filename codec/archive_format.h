@@ -27,7 +27,7 @@ enum {
     LATHE_MAX_PACKET_BYTES = 1 << 30
 };
 #define LATHE_TRAILER_MAGIC 0x5A48544Cu /* "LTHZ" in file order */
-/* Of the bit mask of one structure: what a decoder may have to allocate for one small packet. 2048 x 2048 x 2048 bits. */
+/* Of the bit mask of one structure: what a decoder may have to allocate for one small packet. 2048^3 bits. */
 #define LATHE_MAX_MASK_BYTES (UINT64_C(1) << 30)
 
 /* ---- cursor: checked little-endian reads ---- */
@@ -77,8 +77,9 @@ typedef struct lathe_header {
     lathe_header_structure *structures; /* owned */
 } lathe_header;
 
-/* Parses the header record at the reader and moves behind it. MORE: not all there (untouched *out; reader->lacking is exact as
- * soon as the size is there). Allocates at most 12 times the record's size, after the record is complete and its checksum right. */
+/* Parses the header record at the reader and moves behind it. MORE: not all there (*out is untouched; reader->lacking is
+ * exact as soon as the size is there). Allocates at most 12 times the record's size, and that only when the record is
+ * complete and its checksum right. */
 lathe_status lathe__header_parse(lathe_header *out, lathe_reader *reader);
 void lathe__header_free(lathe_header *header); /* clears; a zeroed one is fine */
 /* How many structures have a packet in the record of a level. */

@@ -14,6 +14,8 @@ typedef struct lathe_known {
 
 typedef struct lathe_occupancy lathe_occupancy;    /* adaptive state; one per structure, kept over its levels */
 lathe_status lathe__occupancy_new(lathe_occupancy **out, int32_t width, int32_t height);   /* pixels, margin included */
+/* A fresh state beside one that has not coded yet: `from` is only a template, whose start-up training (2 ms) is saved. */
+lathe_status lathe__occupancy_copy(lathe_occupancy **out, const lathe_occupancy *from, int32_t width, int32_t height);
 void lathe__occupancy_free(lathe_occupancy **state);
 lathe_status lathe__occupancy_encode(lathe_occupancy *state, lathe_range_encoder *e, const uint64_t *slice,
                                      const lathe_known *known);

@@ -24,7 +24,7 @@ static void put(lathe_range_encoder *e, uint8_t byte) {
  * Nothing is held at first, since low stays below one: no carry ever leaves the first byte. */
 static void shift_low(lathe_range_encoder *e) {
     uint8_t carry = (uint8_t)(e->low >> 32);
-    if (carry || e->low < 0xFF000000u) {
+    if (carry || e->low < 0xFF000000u || !e->pending) {   /* a first byte of 0xFF is held as the cache itself */
         if (e->pending) put(e, (uint8_t)(e->cache + carry));
         for (; e->pending > 1; e->pending--) put(e, (uint8_t)(0xFF + carry));
         e->pending = 0;

@@ -27,16 +27,20 @@ static inline lathe_f4 lathe__min4(lathe_f4 a, lathe_f4 b) { return lathe__selec
 static inline int lathe__bits4(lathe_i4 mask) { return (mask[0] & 1) | (mask[1] & 2) | (mask[2] & 4) | (mask[3] & 8); }
 #endif
 
-typedef struct lathe_box { float low[3], high[3]; } lathe_box;
-typedef struct lathe_box_node { lathe_f4 low[3], high[3]; } lathe_box_node;   /* the boxes of its four children */
+typedef struct lathe_box {
+    float low[3], high[3];
+} lathe_box;
+typedef struct lathe_box_node {
+    lathe_f4 low[3], high[3];
+} lathe_box_node; /* the boxes of its four children */
 
 /* Level 0's node k holds items 4k .. 4k + 3; level l's node k holds level l - 1's nodes 4k .. 4k + 3; the last level is one
  * node. Places without a child have an empty box (low = +inf, high = -inf). */
 enum { LATHE_BOX_TREE_LEVELS = 17 };
 typedef struct lathe_box_tree {
     uint32_t level_count;
-    size_t first[LATHE_BOX_TREE_LEVELS];   /* of each level in nodes */
-    lathe_box_node *nodes;                 /* owned */
+    size_t first[LATHE_BOX_TREE_LEVELS]; /* of each level in nodes */
+    lathe_box_node *nodes;               /* owned */
 } lathe_box_tree;
 
 static inline void lathe__box_tree_free(lathe_box_tree *tree) {
@@ -106,7 +110,9 @@ static inline uint32_t lathe__spread_bits(uint32_t x) {
 }
 
 /* A Morton curve through 1024^3 cells; points outside of them count as on their border. */
-typedef struct lathe_curve { float low[3], scale; } lathe_curve;
+typedef struct lathe_curve {
+    float low[3], scale;
+} lathe_curve;
 
 static inline lathe_curve lathe__curve_through(const lathe_box *box) {
     lathe_curve curve = {{box->low[0], box->low[1], box->low[2]}, 0};
@@ -120,7 +126,7 @@ static inline uint32_t lathe__curve_key(const lathe_curve *curve, const float p[
     uint32_t key = 0;
     for (int i = 0; i < 3; i++) {
         float f = (p[i] - curve->low[i]) * curve->scale;
-        uint32_t cell = f >= 0 && f < 1023 ? (uint32_t)f : f >= 1023 ? 1023 : 0;   /* NaN too gives 0 */
+        uint32_t cell = f >= 0 && f < 1023 ? (uint32_t)f : f >= 1023 ? 1023 : 0; /* NaN too gives 0 */
         key |= lathe__spread_bits(cell) << i;
     }
     return key;
@@ -139,8 +145,8 @@ static inline void lathe__radix_pass(uint64_t *to, const uint64_t *from, uint32_
 }
 
 /* order[k]: index of the k-th point along the curve; key[k]: its key (key may be NULL). MEMORY. */
-static inline lathe_status lathe__curve_order(uint32_t *order, uint32_t *key, const float (*points)[3],
-                                              uint32_t count, const lathe_curve *curve) {
+static inline lathe_status lathe__curve_order(uint32_t *order, uint32_t *key, const float (*points)[3], uint32_t count,
+                                              const lathe_curve *curve) {
     uint64_t *keys = malloc((2 * (size_t)count + 1) * sizeof *keys);
     if (!keys) return LATHE_ERR_MEMORY;
     for (uint32_t k = 0; k < count; k++) keys[k] = (uint64_t)lathe__curve_key(curve, points[k]) << 32 | k;

@@ -4,10 +4,13 @@
 
 /* Corner k of a cube lies at (k & 1, k >> 1 & 1, k >> 2). Edge 4a + o runs along axis a; bit 0 of o is its offset along axis
  * a + 1, bit 1 that along axis a + 2 (cyclic). */
-typedef struct cube_case { uint8_t triangles, edge[10][3]; uint16_t used; } cube_case;
+typedef struct cube_case {
+    uint8_t triangles, edge[10][3];
+    uint16_t used;
+} cube_case;
 
 static int edge_between(int corner, int other) {
-    int axis = (corner ^ other) >> 1, low = corner & other;   /* 1, 2, 4 -> 0, 1, 2 */
+    int axis = (corner ^ other) >> 1, low = corner & other; /* 1, 2, 4 -> 0, 1, 2 */
     return 4 * axis + (low >> (axis + 1) % 3 & 1) + 2 * (low >> (axis + 2) % 3 & 1);
 }
 
@@ -55,9 +58,18 @@ static void make_case(cube_case *out, int inside) {
 
 /* ---- the cells that the surface passes ---- */
 
-typedef struct cell { uint16_t u, v, w; uint8_t inside; } cell;   /* low corner; w counts from the empty slice before slice 0 */
-typedef struct cells { cell *list; size_t count, triangles; const cube_case *table; } cells;
-typedef struct rows { const uint64_t *row[4]; } rows;             /* (v, w), (v + 1, w), (v, w + 1), (v + 1, w + 1) */
+typedef struct cell {
+    uint16_t u, v, w;
+    uint8_t inside;
+} cell; /* low corner; w counts from the empty slice before slice 0 */
+typedef struct cells {
+    cell *list;
+    size_t count, triangles;
+    const cube_case *table;
+} cells;
+typedef struct rows {
+    const uint64_t *row[4];
+} rows; /* (v, w), (v + 1, w), (v, w + 1), (v + 1, w + 1) */
 
 static uint64_t shifted(const uint64_t *row, int32_t k, int32_t words) {
     return row[k] >> 1 | (k + 1 < words ? row[k + 1] << 63 : 0);
@@ -97,7 +109,8 @@ static size_t visit_cells(cells *to, const lathe_mask *mask, const uint64_t *emp
             for (int32_t k = 0; k < words; k++) {
                 uint64_t bits = passed(&r, k, words);
                 count += (size_t)__builtin_popcountll(bits);
-                for (; to->list && bits; bits &= bits - 1) take_cell(to, &r, words, 64 * k + __builtin_ctzll(bits), v, w);
+                for (; to->list && bits; bits &= bits - 1)
+                    take_cell(to, &r, words, 64 * k + __builtin_ctzll(bits), v, w);
             }
         }
     }
@@ -111,8 +124,10 @@ static lathe_status find_cells(cells *to, const lathe_mask *mask) {
     lathe_status status = count == 0 ? LATHE_ERR_EMPTY : count >= INT32_MAX ? LATHE_ERR_LIMIT : LATHE_OK;
     if (status == LATHE_OK) {
         to->list = malloc(count * sizeof *to->list);
-        if (to->list) visit_cells(to, mask, empty);
-        else status = LATHE_ERR_MEMORY;
+        if (to->list)
+            visit_cells(to, mask, empty);
+        else
+            status = LATHE_ERR_MEMORY;
     }
     free(empty);
     return status;
@@ -140,9 +155,9 @@ static lathe_status sort_cells(uint32_t *order, uint32_t *key, const cells *from
 
 typedef struct sampler {
     const lathe_volume *volume;
-    int frame[3];                  /* file axis of u, v, w */
-    int64_t stride[3];             /* in values, along u, v, w */
-    int32_t origin[3];             /* voxel of the mask's (0, 0, 0), along u, v, w */
+    int frame[3];      /* file axis of u, v, w */
+    int64_t stride[3]; /* in values, along u, v, w */
+    int32_t origin[3]; /* voxel of the mask's (0, 0, 0), along u, v, w */
     double iso;
     const float (*to_world)[4];
 } sampler;
@@ -154,7 +169,10 @@ static sampler make_sampler(const lathe_field *field, const float to_world[3][4]
     for (int i = 0; i < 3; i++) {
         s.frame[i] = frame[i];
         s.origin[i] = field->mask->origin[i];
-        if (s.volume) s.stride[i] = frame[i] == 0 ? 1 : frame[i] == 1 ? s.volume->dims[0] : (int64_t)s.volume->dims[0] * s.volume->dims[1];
+        if (s.volume)
+            s.stride[i] = frame[i] == 0   ? 1
+                          : frame[i] == 1 ? s.volume->dims[0]
+                                          : (int64_t)s.volume->dims[0] * s.volume->dims[1];
     }
     return s;
 }
@@ -187,7 +205,8 @@ static float crossing(double iso, double from, double to) {
 static void cell_points(float point[12][3], const sampler *s, const cell *c, const cube_case *shape) {
     float value[8];
     int32_t base[3] = {c->u, c->v, c->w - 1};
-    if (s->volume) corner_values(value, s, (int32_t[3]){base[0] + s->origin[0], base[1] + s->origin[1], base[2] + s->origin[2]});
+    if (s->volume)
+        corner_values(value, s, (int32_t[3]){base[0] + s->origin[0], base[1] + s->origin[1], base[2] + s->origin[2]});
     for (uint32_t bits = shape->used; bits; bits &= bits - 1) {
         int e = __builtin_ctz(bits), a = e >> 2, b = (a + 1) % 3, d = (a + 2) % 3;
         int corner = (e & 1) << b | (e >> 1 & 1) << d;
@@ -199,7 +218,8 @@ static void cell_points(float point[12][3], const sampler *s, const cell *c, con
     }
 }
 
-static void emit_triangles(lathe_soup *soup, const cells *from, const uint32_t *order, const uint32_t *key, const sampler *s) {
+static void emit_triangles(lathe_soup *soup, const cells *from, const uint32_t *order, const uint32_t *key,
+                           const sampler *s) {
     size_t n = 0;
     float point[12][3];
     for (size_t k = 0; k < from->count; k++) {

@@ -5,14 +5,16 @@
 #include <string.h>
 
 /* A corner at some vertex v of triangle (v, next, previous): the edge of v's link from next to previous. */
-typedef struct link { uint32_t next, previous, triangle; } link;
+typedef struct link {
+    uint32_t next, previous, triangle;
+} link;
 
 typedef struct check {
     const lathe_mesh *mesh;
     lathe_mesh_report *report;
-    uint32_t *first;           /* vertex_count + 1: where a vertex's links begin */
+    uint32_t *first; /* vertex_count + 1: where a vertex's links begin */
     link *links;
-    uint32_t *parent;          /* union-find over triangles; UINT32_MAX: left out, its indices are bad */
+    uint32_t *parent; /* union-find over triangles; UINT32_MAX: left out, its indices are bad */
     uint64_t edges, used;
 } check;
 
@@ -28,8 +30,10 @@ static uint32_t find_root(uint32_t *parent, uint32_t k) {
 static void unite(check *c, uint32_t a, uint32_t b) {
     a = find_root(c->parent, a);
     b = find_root(c->parent, b);
-    if (a < b) c->parent[b] = a;
-    else c->parent[a] = b;
+    if (a < b)
+        c->parent[b] = a;
+    else
+        c->parent[a] = b;
 }
 
 static void collect_links(check *c) {
@@ -52,10 +56,9 @@ static void collect_links(check *c) {
         if (c->parent[k] == UINT32_MAX) continue;
         if (lathe__triangle_degenerate(mesh->lattice[t[0]], mesh->lattice[t[1]], mesh->lattice[t[2]]))
             c->report->degenerate_triangles++;
-        for (int i = 0; i < 3; i++)
-            c->links[c->first[t[i]]++] = (link){t[(i + 1) % 3], t[(i + 2) % 3], (uint32_t)k};
+        for (int i = 0; i < 3; i++) c->links[c->first[t[i]]++] = (link){t[(i + 1) % 3], t[(i + 2) % 3], (uint32_t)k};
     }
-    memmove(c->first + 1, c->first, mesh->vertex_count * sizeof *c->first);   /* the ends are the next ones' beginnings */
+    memmove(c->first + 1, c->first, mesh->vertex_count * sizeof *c->first); /* the ends are the next ones' beginnings */
     c->first[0] = 0;
 }
 
@@ -78,7 +81,7 @@ static bool chain_fan(link *links, uint32_t n) {
 
 static void count_fan_edges(check *c, uint32_t v, const link *links, uint32_t n) {
     for (uint32_t i = 0; i < n; i++) {
-        if (links[i].next < v) continue;      /* an edge counts at its lower end */
+        if (links[i].next < v) continue; /* an edge counts at its lower end */
         c->edges++;
         unite(c, links[i].triangle, links[i ? i - 1 : n - 1].triangle);
     }
@@ -87,12 +90,16 @@ static void count_fan_edges(check *c, uint32_t v, const link *links, uint32_t n)
 /* ---- the general case: many triangles, or no single closed fan ---- */
 
 /* One half-edge at a vertex: to or from a neighbour. */
-typedef struct spoke { uint32_t neighbour, triangle, outgoing, link; } spoke;
+typedef struct spoke {
+    uint32_t neighbour, triangle, outgoing, link;
+} spoke;
 
 static int compare_spokes(const void *a, const void *b) {
     const spoke *s = a, *t = b;
     if (s->neighbour != t->neighbour) return s->neighbour < t->neighbour ? -1 : 1;
-    return s->outgoing != t->outgoing ? (s->outgoing < t->outgoing ? 1 : -1) : s->link < t->link ? -1 : s->link > t->link;
+    return s->outgoing != t->outgoing ? (s->outgoing < t->outgoing ? 1 : -1)
+           : s->link < t->link        ? -1
+                                      : s->link > t->link;
 }
 
 static void count_edge(check *c, uint32_t v, const spoke *spokes, uint32_t n) {
@@ -104,9 +111,12 @@ static void count_edge(check *c, uint32_t v, const spoke *spokes, uint32_t n) {
         unite(c, spokes[0].triangle, spokes[i].triangle);
     }
     /* An edge from v to itself shows both of its ends here; its triangle is degenerate. */
-    if (n == 1) c->report->boundary_edges++;
-    else if (n > 2) c->report->nonmanifold_edges++;
-    else if (outgoing != 1) c->report->misoriented_edges++;
+    if (n == 1)
+        c->report->boundary_edges++;
+    else if (n > 2)
+        c->report->nonmanifold_edges++;
+    else if (outgoing != 1)
+        c->report->misoriented_edges++;
 }
 
 /* after[k]: the link that follows link k around v. True when following it from link 0 meets all of them. */
@@ -144,7 +154,7 @@ cleanup:
 }
 
 static lathe_status check_vertices(check *c) {
-    enum { SMALL = 24 };                       /* up to here chaining by search beats sorting */
+    enum { SMALL = 24 }; /* up to here chaining by search beats sorting */
     for (uint32_t v = 0; v < c->mesh->vertex_count; v++) {
         link *links = c->links + c->first[v];
         uint32_t n = c->first[v + 1] - c->first[v];
@@ -200,9 +210,12 @@ static lathe_status count_duplicates(uint64_t *out, const int32_t (*positions)[3
     uint64_t found = 0;
     for (uint32_t v = 0; v < count; v++) {
         size_t at = (size_t)hash_position(positions[v]) & (size - 1);
-        while (slots[at] != UINT32_MAX && memcmp(positions[slots[at]], positions[v], sizeof *positions)) at = (at + 1) & (size - 1);
-        if (slots[at] != UINT32_MAX) found++;
-        else slots[at] = v;
+        while (slots[at] != UINT32_MAX && memcmp(positions[slots[at]], positions[v], sizeof *positions))
+            at = (at + 1) & (size - 1);
+        if (slots[at] != UINT32_MAX)
+            found++;
+        else
+            slots[at] = v;
     }
     free(slots);
     *out = found;
@@ -226,7 +239,7 @@ lathe_status lathe__mesh_float_duplicates(uint64_t *out, const lathe_mesh *mesh,
     lathe_status status = LATHE_ERR_MEMORY;
     if (positions && bits) {
         lathe_mesh_positions(mesh, transform, positions);
-        for (size_t k = 0; k < 3 * count; k++) positions[k] += 0.0f;   /* -0 becomes 0 */
+        for (size_t k = 0; k < 3 * count; k++) positions[k] += 0.0f; /* -0 becomes 0 */
         memcpy(bits, positions, 3 * count * sizeof *positions);
         status = count_duplicates(out, (const int32_t(*)[3])bits, mesh->vertex_count);
     }

@@ -7,16 +7,16 @@
 typedef struct surface {
     lathe_soup soup;
     uint32_t packet_count;
-    lathe_box_tree tree;           /* its items are the packets */
-    float *area;                   /* of each packet */
+    lathe_box_tree tree; /* its items are the packets */
+    float *area;         /* of each packet */
     double total_area;
 } surface;
 
 /* All lengths are in units of the smallest spacing, so that no scan is too small or too large for float. */
 struct lathe_reference {
-    lathe_transform to_world;      /* lattice -> world, from the middle */
+    lathe_transform to_world; /* lattice -> world, from the middle */
     double unit_mm;
-    lathe_curve curve;             /* of both surfaces: where a point lies on it tells where to look first */
+    lathe_curve curve; /* of both surfaces: where a point lies on it tells where to look first */
     surface surface;
 };
 
@@ -30,7 +30,9 @@ static void surface_free(surface *s) {
 
 /* ---- four triangles at once ---- */
 
-typedef struct vector4 { lathe_f4 x, y, z; } vector4;
+typedef struct vector4 {
+    lathe_f4 x, y, z;
+} vector4;
 
 static inline vector4 load(const lathe_f4 corner[3]) { return (vector4){corner[0], corner[1], corner[2]}; }
 static inline vector4 minus(vector4 a, vector4 b) { return (vector4){a.x - b.x, a.y - b.y, a.z - b.z}; }
@@ -51,7 +53,8 @@ static inline lathe_f4 segment_distance(vector4 a, vector4 e, lathe_f4 length2) 
  * be noise, and its inside is no farther than that height. */
 static inline lathe_f4 packet_distance(const lathe_packet *packet, const lathe_f4 p[3]) {
     vector4 at = load(p);
-    vector4 a = minus(load(packet->corner[0]), at), b = minus(load(packet->corner[1]), at), c = minus(load(packet->corner[2]), at);
+    vector4 a = minus(load(packet->corner[0]), at), b = minus(load(packet->corner[1]), at),
+            c = minus(load(packet->corner[2]), at);
     vector4 ab = minus(b, a), bc = minus(c, b), ca = minus(a, c), n = cross(ab, bc);
     lathe_f4 lab = dot(ab, ab), lbc = dot(bc, bc), lca = dot(ca, ca), n2 = dot(n, n);
     lathe_f4 longest = lathe__max4(lab, lathe__max4(lbc, lca));
@@ -81,7 +84,10 @@ static inline lathe_f4 box_distance(const lathe_box_node *node, const lathe_f4 p
 /* ---- the nearest triangle ---- */
 
 /* Level 0: a packet; l: a node of the tree's level l - 1. */
-typedef struct place { float distance; uint32_t level, index; } place;
+typedef struct place {
+    float distance;
+    uint32_t level, index;
+} place;
 enum { STACK = 4 * LATHE_BOX_TREE_LEVELS };
 
 /* Puts the children nearer than best on the stack, the nearest on top. Their memory is asked for now: on a large surface most
@@ -120,7 +126,11 @@ static inline float try_packet(const surface *s, uint32_t index, const lathe_f4 
 }
 
 /* along: the packet at the last point's place on the curve. */
-typedef struct search { const surface *in; const lathe_curve *curve; uint32_t along; } search;
+typedef struct search {
+    const surface *in;
+    const lathe_curve *curve;
+    uint32_t along;
+} search;
 
 /* The last packet that begins at or before the point's key, or the first: by doubling steps from the last search's, since
  * neighbours in space can be far apart on the curve. */
@@ -139,8 +149,10 @@ static inline uint32_t follow_curve(search *q, const float at[3]) {
         }
     while (high - low > 1) {
         uint32_t middle = low + (high - low) / 2;
-        if (key[middle] <= want) low = middle;
-        else high = middle;
+        if (key[middle] <= want)
+            low = middle;
+        else
+            high = middle;
     }
     return q->along = low;
 }
@@ -162,8 +174,10 @@ static float nearest(const surface *s, const float at[3], uint32_t along, float 
     while (top && best > enough) {
         place next = stack[--top];
         if (!(next.distance < best)) continue;
-        if (next.level) top = push_children(stack, top, s, next, p, best);
-        else best = try_packet(s, next.index, p, best);
+        if (next.level)
+            top = push_children(stack, top, s, next, p, best);
+        else
+            best = try_packet(s, next.index, p, best);
     }
     return best;
 }
@@ -205,7 +219,8 @@ static void mesh_points(float (*out)[3], const lathe_mesh *mesh, const lathe_tra
     for (size_t k = 0; k < mesh->vertex_count; k++)
         for (int i = 0; i < 3; i++) {
             const double *m = to->m[i];
-            out[k][i] = (float)(m[0] * mesh->lattice[k][0] + m[1] * mesh->lattice[k][1] + m[2] * mesh->lattice[k][2] + m[3]);
+            out[k][i] =
+                (float)(m[0] * mesh->lattice[k][0] + m[1] * mesh->lattice[k][1] + m[2] * mesh->lattice[k][2] + m[3]);
         }
 }
 
@@ -223,7 +238,8 @@ static lathe_status surface_from_mesh(surface *s, const lathe_mesh *mesh, const 
         const uint32_t *t = mesh->triangles[k];
         for (int i = 0; i < 3; i++) middle[k][i] = (points[t[0]][i] + points[t[1]][i] + points[t[2]][i]) / 3;
     }
-    if ((status = lathe__curve_order(order, key, (const float(*)[3])middle, s->soup.count, curve)) != LATHE_OK) goto cleanup;
+    if ((status = lathe__curve_order(order, key, (const float(*)[3])middle, s->soup.count, curve)) != LATHE_OK)
+        goto cleanup;
     for (size_t k = 0; k < count; k += 4) s->soup.key[k / 4] = key[k];
     for (size_t k = 0; k < count; k++)
         for (int c = 0; c < 3; c++) lathe__packet_put(s->soup.packets, k, c, points[mesh->triangles[order[k]][c]]);
@@ -237,7 +253,10 @@ cleanup:
 
 /* ---- sampling ---- */
 
-typedef struct tally { double sum2; float max2; } tally;
+typedef struct tally {
+    double sum2;
+    float max2;
+} tally;
 
 static float triangle_area(const lathe_packet *q, uint32_t k) {
     float u[3], v[3];
@@ -259,7 +278,12 @@ static void triangle_point(float p[3], const lathe_packet *q, uint32_t k, double
 }
 
 /* Every (area / samples)-th point along the curve; within the triangles by the additive sequence of the plastic number. */
-typedef struct walk { const surface *on; double step, before; size_t n; uint32_t packet; } walk;
+typedef struct walk {
+    const surface *on;
+    double step, before;
+    size_t n;
+    uint32_t packet;
+} walk;
 
 static void next_point(walk *w, float p[3]) {
     const surface *s = w->on;
@@ -277,20 +301,25 @@ static void next_point(walk *w, float p[3]) {
     w->n++;
 }
 
-/* In batches, so that the memory of a batch's first packets comes in together. */
+/* Points are looked up in batches, so that the memory of a batch's first packets comes in together. */
+enum { BATCH = 16 };
+
+static void look_up(search *to, uint32_t along[BATCH], const float (*points)[3], size_t count) {
+    for (size_t k = 0; k < count; k++) {
+        along[k] = follow_curve(to, points[k]);
+        prefetch(&to->in->soup.packets[along[k]], sizeof(lathe_packet));
+        prefetch(&to->in->tree.nodes[along[k] / 4], sizeof(lathe_box_node));
+    }
+}
+
 static tally sample_distances(const surface *from, search to, size_t samples) {
-    enum { BATCH = 16 };
     tally t = {0};
     walk w = {from, from->total_area / (double)samples, 0, 0, 0};
     while (w.n < samples) {
         float p[BATCH][3];
         uint32_t along[BATCH], count = 0;
-        for (; count < BATCH && w.n < samples; count++) {
-            next_point(&w, p[count]);
-            along[count] = follow_curve(&to, p[count]);
-            prefetch(&to.in->soup.packets[along[count]], sizeof(lathe_packet));
-            prefetch(&to.in->tree.nodes[along[count] / 4], sizeof(lathe_box_node));
-        }
+        for (; count < BATCH && w.n < samples; count++) next_point(&w, p[count]);
+        look_up(&to, along, (const float(*)[3])p, count);
         for (uint32_t k = 0; k < count; k++) {
             float d = nearest(to.in, p[k], along[k], 0);
             t.sum2 += (double)d;
@@ -302,9 +331,14 @@ static tally sample_distances(const surface *from, search to, size_t samples) {
 
 /* Only the largest is asked for, so a search ends as soon as it cannot be that: mostly at the first packet. */
 static float farthest_point(search to, const float (*points)[3], size_t count, float max2) {
-    for (size_t k = 0; k < count; k++) {
-        float d = nearest(to.in, points[k], follow_curve(&to, points[k]), max2);
-        max2 = d > max2 ? d : max2;
+    for (size_t k = 0; k < count; k += BATCH) {
+        uint32_t along[BATCH];
+        size_t n = count - k < BATCH ? count - k : BATCH;
+        look_up(&to, along, points + k, n);
+        for (size_t i = 0; i < n; i++) {
+            float d = nearest(to.in, points[k + i], along[i], max2);
+            max2 = d > max2 ? d : max2;
+        }
     }
     return max2;
 }
@@ -348,21 +382,24 @@ static void set_frame(lathe_reference *reference, const lathe_volume *volume, la
     reference->curve = lathe__curve_through(&(lathe_box){{-e, -e, -e}, {e, e, e}});
 }
 
-lathe_status lathe__reference_build(lathe_reference **out, const lathe_volume *volume, lathe_axis axis, const lathe_mask *mask,
-                                    lathe_boundary boundary, double iso) {
+lathe_status lathe__reference_build(lathe_reference **out, const lathe_volume *volume, lathe_axis axis,
+                                    const lathe_mask *mask, lathe_boundary boundary, double iso) {
     lathe_reference *reference = calloc(1, sizeof *reference);
     if (!reference) return LATHE_ERR_MEMORY;
     set_frame(reference, volume, axis, mask);
     float to_world[3][4];
     for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 4; j++) to_world[i][j] = (float)(reference->to_world.m[i][j] * (j < 3 ? LATHE_LATTICE_ONE : 1));
+        for (int j = 0; j < 4; j++)
+            to_world[i][j] = (float)(reference->to_world.m[i][j] * (j < 3 ? LATHE_LATTICE_ONE : 1));
     lathe_field field = {mask, boundary == LATHE_BOUNDARY_ISO ? volume : NULL, axis, iso};
     surface *s = &reference->surface;
     const lathe_curve *curve = &reference->curve;
     lathe_status status = lathe__marching_cubes(&s->soup, &field, (const float(*)[4])to_world, curve);
     if (status == LATHE_OK) status = surface_finish(s);
-    if (status == LATHE_OK) *out = reference;
-    else lathe__reference_free(&reference);
+    if (status == LATHE_OK)
+        *out = reference;
+    else
+        lathe__reference_free(&reference);
     return status;
 }
 

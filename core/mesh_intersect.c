@@ -3,7 +3,7 @@
 #include "box_tree.h"
 
 __extension__ typedef __int128 int128;
-typedef const int32_t *point;              /* three lattice coordinates */
+typedef const int32_t *point; /* three lattice coordinates */
 
 static int sign128(int128 x) { return (x > 0) - (x < 0); }
 static int sign64(int64_t x) { return (x > 0) - (x < 0); }
@@ -65,7 +65,9 @@ bool lathe__triangle_degenerate(point a, point b, point c) {
 
 /* ---- coplanar: in the projection along an axis where the triangle keeps its area ---- */
 
-typedef struct plane { int i, j; } plane;
+typedef struct plane {
+    int i, j;
+} plane;
 
 static plane projection(point a, point b, point c) {
     for (int i = 0; i < 2; i++)
@@ -98,7 +100,8 @@ static bool triangle_holds(point a, point b, point c, point p, plane in) {
 static bool coplanar_segment_meets(point s, point t, const point q[3]) {
     plane in = projection(q[0], q[1], q[2]);
     if (triangle_holds(q[0], q[1], q[2], s, in)) return true;
-    return segments_meet(s, t, q[0], q[1], in) || segments_meet(s, t, q[1], q[2], in) || segments_meet(s, t, q[2], q[0], in);
+    return segments_meet(s, t, q[0], q[1], in) || segments_meet(s, t, q[1], q[2], in) ||
+           segments_meet(s, t, q[2], q[0], in);
 }
 
 /* ---- in space ---- */
@@ -173,14 +176,15 @@ static bool triangles_meet(const lathe_mesh *mesh, uint32_t first, uint32_t seco
 typedef struct join {
     const lathe_mesh *mesh;
     const lathe_box_tree *tree;
-    const uint32_t *order;     /* triangle of each item */
+    const uint32_t *order; /* triangle of each item */
     uint64_t found;
 } join;
 
 static int touching(const lathe_box_node *a, int child, const lathe_box_node *b) {
     lathe_i4 mask = {-1, -1, -1, -1};
     for (int i = 0; i < 3; i++) {
-        lathe_f4 low = lathe__f4(((const float *)&a->low[i])[child]), high = lathe__f4(((const float *)&a->high[i])[child]);
+        lathe_f4 low = lathe__f4(((const float *)&a->low[i])[child]),
+                 high = lathe__f4(((const float *)&a->high[i])[child]);
         mask &= (lathe_i4)(low <= b->high[i]) & (lathe_i4)(high >= b->low[i]);
     }
     return lathe__bits4(mask);
@@ -195,8 +199,10 @@ static void join_nodes(join *j, uint32_t level, size_t a, size_t b) {
         for (int k = 0; k < 4; k++) {
             if (!(hits >> k & 1)) continue;
             size_t first = 4 * a + (size_t)i, second = 4 * b + (size_t)k;
-            if (level) join_nodes(j, level - 1, first, second);
-            else j->found += triangles_meet(j->mesh, j->order[first], j->order[second]);
+            if (level)
+                join_nodes(j, level - 1, first, second);
+            else
+                j->found += triangles_meet(j->mesh, j->order[first], j->order[second]);
         }
     }
 }
@@ -240,7 +246,8 @@ lathe_status lathe__mesh_intersections(uint64_t *out, const lathe_mesh *mesh) {
     join j = {mesh, &tree, order, 0};
     if (count) {
         lathe_curve curve = box_middles(mesh, sound, middle, count);
-        if ((status = lathe__curve_order(order, NULL, (const float(*)[3])middle, count, &curve)) != LATHE_OK) goto cleanup;
+        if ((status = lathe__curve_order(order, NULL, (const float(*)[3])middle, count, &curve)) != LATHE_OK)
+            goto cleanup;
         for (uint32_t k = 0; k < count; k++) {
             order[k] = sound[order[k]];
             boxes[k] = triangle_box(mesh, mesh->triangles[order[k]]);

@@ -4,9 +4,9 @@
 
 enum { EAST, NORTH, WEST, SOUTH };
 static const int STEP_U[4] = {1, 0, -1, 0}, STEP_V[4] = {0, 1, 0, -1};
-/* How far a dent reaches beyond the square's centre: about 1/16 pixel; twice an odd number, so that no line through two
- * vertices of the other slice can meet it. */
-enum { DENT = 4098 };
+/* How far a dent reaches beyond the square's centre in slices of even and of odd order: about 1/16 pixel; twice an odd number, so
+ * that no line through two vertices of the other slice can meet it. */
+static const int32_t DENT[2] = {4098, 5122};
 
 typedef struct tracer {
     const lathe_slice_view *view;
@@ -76,8 +76,8 @@ static lathe_status walk(tracer *t, int32_t u0, int32_t v0, int direction0) {
             continue;
         }
         if (opposite(view->below, view, u, v, bu, bv, ou, ov, au, av) || opposite(view->above, view, u, v, bu, bv, ou, ov, au, av)) {
-            int32_t half = LATHE_LATTICE_ONE / 2;
-            add_point(t, (au + ou) * half + (au - ou) * DENT, (av + ov) * half + (av - ov) * DENT, LATHE_NO_BORDER);
+            int32_t half = LATHE_LATTICE_ONE / 2, dent = DENT[view->parity & 1];
+            add_point(t, (au + ou) * half + (au - ou) * dent, (av + ov) * half + (av - ov) * dent, LATHE_NO_BORDER);
         }
         u = bu;
         v = bv;

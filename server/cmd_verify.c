@@ -2,6 +2,7 @@
 #include "cli.h"
 #include "mask.h"
 #include "mesh.h"
+#include "rebake.h"
 #include <inttypes.h>
 #include <jansson.h>
 #include <math.h>
@@ -13,6 +14,8 @@ typedef struct level_result {
     lathe_mesh_report report;
     uint64_t float_duplicates;
     bool counts_match;             /* vertices and triangles are those of the index */
+    uint64_t hash;                 /* of the mesh */
+    bool encoded_differs;          /* from the mesh that a second bake of the volume gives */
 } level_result;
 
 typedef struct structure_result {
@@ -27,6 +30,7 @@ typedef struct verification {
     structure_result *structures;
     uint64_t failures;
     bool intersections;            /* --no-intersections skips the only slow check */
+    bool rebake;                   /* --no-rebake: the archive is of another version of Lathe */
 } verification;
 
 /* ---- what must hold ---- */
@@ -45,7 +49,7 @@ static bool topology_matches(const structure_result *structure, const level_resu
 }
 
 static bool level_passes(const structure_result *structure, const level_result *level) {
-    if (!level->seen || !level->counts_match) return false;
+    if (!level->seen || !level->counts_match || level->encoded_differs) return false;
     if (edge_flaws(&level->report) || shape_flaws(level)) return false;
     if (!level->last) return true;
     if (level->report.self_intersections) return false;
@@ -86,6 +90,7 @@ static lathe_status check_step(verification *v, lathe_decoder *decoder, const la
         status = lathe__mesh_float_duplicates(&level->float_duplicates, mesh, lathe_decoder_transform(decoder, step->structure));
     if (status) return lathe_fail(err, status, "structure %u, level %u: %s", step->structure, step->level, lathe_status_name(status));
     level->counts_match = mesh->vertex_count == stated->vertices && mesh->triangle_count == stated->triangles;
+    level->hash = lathe__hash_mesh(LATHE_FNV_START, mesh);
     level->seen = true;
     return LATHE_OK;
 }
@@ -164,6 +169,52 @@ static lathe_status compare_with_volume(verification *v, const lathe_volume *vol
     return status;
 }
 
+/* ---- what was encoded ---- */
+
+static lathe_status compare_step(verification *v, lathe_decoder *decoder, const lathe_step *step) {
+    const lathe_mesh *mesh = lathe_decoder_mesh(decoder, step->structure);
+    if (!mesh || step->structure >= v->info->structure_count) return LATHE_ERR_FORMAT;
+    if (step->level >= v->info->structures[step->structure].level_count) return LATHE_ERR_FORMAT;
+    level_result *level = &v->structures[step->structure].levels[step->level];
+    level->encoded_differs = lathe__hash_mesh(LATHE_FNV_START, mesh) != level->hash;
+    return LATHE_OK;
+}
+
+static lathe_status compare_meshes(verification *v, const lathe_model *encoded) {
+    size_t size;
+    const uint8_t *stream = lathe__whole_stream(encoded, &size);
+    lathe_decoder *decoder = NULL;
+    lathe_status status = lathe_decoder_open(&decoder);
+    if (status) return status;
+    status = lathe_decoder_feed(decoder, stream, size);
+    while (!status) {
+        lathe_step step;
+        status = lathe_decoder_step(decoder, &step);
+        if (!status) status = compare_step(v, decoder, &step);
+    }
+    lathe_decoder_close(&decoder);
+    return status == LATHE_MORE ? LATHE_OK : status;
+}
+
+static void expect_nothing(verification *v) {
+    for (uint32_t i = 0; i < v->info->structure_count; i++)
+        for (uint32_t n = 0; n < v->info->structures[i].level_count; n++) v->structures[i].levels[n].encoded_differs = true;
+}
+
+/* A volume that cannot be baked so is another one: every level differs. Levels that the second bake has not, differ too. */
+static lathe_status compare_with_encoded(verification *v, const lathe_volume *volume, lathe_error *err) {
+    expect_nothing(v);
+    lathe_bytes bytes = {NULL, 0, 0};
+    lathe_status status = lathe__rebake(&bytes, v->info, volume, err);
+    if (status) return status == LATHE_ERR_MEMORY ? status : LATHE_OK;
+    lathe_model *encoded = NULL;
+    status = lathe_model_parse(&encoded, bytes.bytes, bytes.size, err);
+    if (!status && compare_meshes(v, encoded)) expect_nothing(v);
+    lathe_model_close(&encoded);
+    free(bytes.bytes);
+    return status;
+}
+
 static void count_failures(verification *v) {
     for (uint32_t i = 0; i < v->info->structure_count; i++)
         for (uint32_t n = 0; n < v->info->structures[i].level_count; n++)
@@ -189,7 +240,7 @@ static level_sum sum_level(const verification *v, uint32_t n) {
         sum.edges += edge_flaws(&level->report);
         sum.shapes += shape_flaws(level);
         sum.intersections += level->report.self_intersections;
-        sum.mismatches += !level->seen || !level->counts_match || (level->last && s->compared && !topology_matches(s, level));
+        sum.mismatches += !level->seen || !level->counts_match || level->encoded_differs || (level->last && s->compared && !topology_matches(s, level));
         sum.components += level->report.components;
         sum.euler += level->report.euler;
         sum.triangles += v->info->structures[i].levels[n].triangles;
@@ -205,6 +256,7 @@ static void print_flaw(const verification *v, uint32_t i, uint32_t n) {
     printf("FAILED  %s, level %u:", lathe__printable(name, sizeof name, v->info->structures[i].name), n);
     if (!level->seen) { puts(" not in the stream"); return; }
     if (!level->counts_match) printf(" vertices or triangles are not those of the index;");
+    if (level->encoded_differs) printf(" not the mesh that the volume gives;");
     if (edge_flaws(r))
         printf(" %" PRIu64 " open, %" PRIu64 " non-manifold, %" PRIu64 " misoriented edges;", r->boundary_edges,
                r->nonmanifold_edges, r->misoriented_edges);
@@ -221,12 +273,12 @@ static void print_flaw(const verification *v, uint32_t i, uint32_t n) {
 }
 
 static void print_table(const verification *v, bool with_volume) {
-    printf("%5s %10s %10s %10s %10s %14s %10s %8s\n", "level", "structures", "triangles", "edge flaws", "other", "intersections",
-           "components", "euler");
+    printf("%5s %10s %10s %10s %10s %10s %14s %10s %8s\n", "level", "structures", "triangles", "edge flaws", "other", "mismatches",
+           "intersections", "components", "euler");
     for (uint32_t n = 0; n < v->info->level_count; n++) {
         level_sum s = sum_level(v, n);
-        printf("%5u %6" PRIu64 "/%-3" PRIu64 " %10" PRIu64 " %10" PRIu64 " %10" PRIu64 " ", n, s.passed, s.structures, s.triangles, s.edges,
-               s.shapes);
+        printf("%5u %6" PRIu64 "/%-3" PRIu64 " %10" PRIu64 " %10" PRIu64 " %10" PRIu64 " %10" PRIu64 " ", n, s.passed, s.structures, s.triangles, s.edges,
+               s.shapes, s.mismatches);
         if (v->intersections) printf("%14" PRIu64, s.intersections);
         else printf("%14s", "not counted");
         printf(" %10" PRIu64 " %8" PRId64 "\n", s.components, s.euler);
@@ -283,6 +335,7 @@ static int verify_model(verification *v, const char *path, const char *volume_pa
         lathe_volume *volume = NULL;
         status = lathe_volume_open(&volume, volume_path, &err);
         if (!status) status = compare_with_volume(v, volume, &err);
+        if (!status && v->rebake) status = compare_with_encoded(v, volume, &err);
         lathe_volume_close(&volume);
         if (status) return lathe__status_error("verify", volume_path, status, &err);
     }
@@ -293,17 +346,18 @@ static int verify_model(verification *v, const char *path, const char *volume_pa
 }
 
 static int run(int argc, char **argv) {
-    bool json = false, intersections = true;
+    bool json = false, intersections = true, rebake = true;
     const lathe_option options[] = {LATHE_OPTION_FLAG("json", &json, true),
-                                    LATHE_OPTION_FLAG("no-intersections", &intersections, false)};
-    int count, status = lathe__parse_options(&lathe__command_verify, argc, argv, options, 2, &count);
+                                    LATHE_OPTION_FLAG("no-intersections", &intersections, false),
+                                    LATHE_OPTION_FLAG("no-rebake", &rebake, false)};
+    int count, status = lathe__parse_options(&lathe__command_verify, argc, argv, options, 3, &count);
     if (status != LATHE_PARSED) return status;
     if (count < 1 || count > 2) return lathe__usage_error(&lathe__command_verify, "FILE and perhaps VOLUME are needed");
     lathe_model *model = NULL;
     lathe_error err = {{0}};
     lathe_status opened = lathe_model_open(&model, argv[1], &err);
     if (opened) return lathe__status_error("verify", argv[1], opened, &err);
-    verification v = {.info = lathe_model_describe(model), .model = model, .intersections = intersections};
+    verification v = {.info = lathe_model_describe(model), .model = model, .intersections = intersections, .rebake = rebake};
     status = verify_model(&v, argv[1], count == 2 ? argv[2] : NULL, json);
     release(&v);
     lathe_model_close(&model);
@@ -312,12 +366,14 @@ static int run(int argc, char **argv) {
 
 const lathe_command lathe__command_verify = {
     "verify", "check every level of an archive",
-    "Usage: lathe verify [--json] [--no-intersections] FILE [VOLUME]\n\n"
+    "Usage: lathe verify [--json] [--no-intersections] [--no-rebake] FILE [VOLUME]\n\n"
     "Checks the checksums of FILE (.lathe), decodes it, and checks every level of every structure: closed, 2-manifold,\n"
     "oriented, no degenerate triangle, no two vertices at one position, vertices and triangles as the index says;\n"
     "self-intersections are counted and must be 0 at the last level. With the VOLUME it was baked from: components and\n"
-    "Euler characteristic of the last level are those of the voxels, which are counted independently.\n"
+    "Euler characteristic of the last level are those of the voxels, which are counted independently; and the meshes are\n"
+    "those that the volume gives when it is baked again.\n"
     "Exit status 1 when a check fails.\n\n"
     "  --json               every level of every structure\n"
-    "  --no-intersections   do not count self-intersections (the only slow check)\n",
+    "  --no-intersections   do not count self-intersections (the only slow check)\n"
+    "  --no-rebake          do not bake VOLUME again (for archives of another version of Lathe)\n",
     run};

@@ -55,19 +55,19 @@ int main(int argc, char **argv) {
         std::fprintf(stderr, "usage: cgal_check BINARY.stl\n");
         return 2;
     }
-    // Not oriented or repaired first: it must be right as it is.
-    bool manifold = processing::is_polygon_soup_a_polygon_mesh(soup.triangles), closed = false, outward = false;
-    std::vector<std::pair<std::size_t, std::size_t>> pairs;
-    std::size_t components = 0;
-    processing::triangle_soup_self_intersections(soup.points, soup.triangles, std::back_inserter(pairs));
-    if (manifold) {
-        Mesh mesh;
-        processing::polygon_soup_to_polygon_mesh(soup.points, soup.triangles, mesh);
-        components = processing::connected_components(mesh, mesh.add_property_map<Mesh::Face_index, std::size_t>("f:component").first);
-        closed = CGAL::is_closed(mesh);
-        outward = closed && processing::is_outward_oriented(mesh) && (!pairs.empty() || processing::does_bound_a_volume(mesh));
-    }
-    std::printf("{\"closed\":%s,\"self_intersections\":%zu,\"components\":%zu,\"outward\":%s}\n", closed ? "true" : "false",
-                pairs.size(), components, outward ? "true" : "false");
+    // It must be right as it is; what is not is torn apart at the faults, only so that it can be counted.
+    bool manifold = processing::is_polygon_soup_a_polygon_mesh(soup.triangles);
+    if (!manifold) processing::orient_polygon_soup(soup.points, soup.triangles);
+    Mesh mesh;
+    processing::polygon_soup_to_polygon_mesh(soup.points, soup.triangles, mesh);
+    std::vector<std::pair<Mesh::Face_index, Mesh::Face_index>> pairs;
+    processing::self_intersections(faces(mesh), mesh, std::back_inserter(pairs));
+    auto component = mesh.add_property_map<Mesh::Face_index, std::size_t>("f:component").first;
+    std::size_t components = processing::connected_components(mesh, component);
+    bool closed = manifold && CGAL::is_closed(mesh);
+    bool outward =
+        closed && processing::is_outward_oriented(mesh) && (!pairs.empty() || processing::does_bound_a_volume(mesh));
+    std::printf("{\"closed\":%s,\"self_intersections\":%zu,\"components\":%zu,\"outward\":%s}\n",
+                closed ? "true" : "false", pairs.size(), components, outward ? "true" : "false");
     return closed && outward && pairs.empty() ? 0 : 1;
 }

@@ -5,7 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-typedef struct vec { int64_t x, y, z; } vec;
+typedef struct vec {
+    int64_t x, y, z;
+} vec;
 
 static uint64_t seed = 1;
 static uint32_t chance(uint32_t n) {
@@ -13,7 +15,8 @@ static uint32_t chance(uint32_t n) {
     return (uint32_t)(seed >> 33) % n;
 }
 
-static lathe_mesh_report check_mesh(int32_t (*lattice)[3], uint32_t vertices, uint32_t (*triangles)[3], uint32_t count) {
+static lathe_mesh_report check_mesh(int32_t (*lattice)[3], uint32_t vertices, uint32_t (*triangles)[3],
+                                    uint32_t count) {
     lathe_mesh mesh = {vertices, count, lattice, triangles};
     lathe_mesh_report report;
     memset(&report, 0xAA, sizeof report);
@@ -22,8 +25,9 @@ static lathe_mesh_report check_mesh(int32_t (*lattice)[3], uint32_t vertices, ui
 }
 
 static uint64_t faults(const lathe_mesh_report *r) {
-    return r->boundary_edges + r->nonmanifold_edges + r->misoriented_edges + r->nonmanifold_vertices + r->degenerate_triangles +
-           r->duplicate_positions + r->unused_vertices + r->bad_indices + r->self_intersections;
+    return r->boundary_edges + r->nonmanifold_edges + r->misoriented_edges + r->nonmanifold_vertices +
+           r->degenerate_triangles + r->duplicate_positions + r->unused_vertices + r->bad_indices +
+           r->self_intersections;
 }
 
 static int32_t corners[9][3] = {{0, 0, 0},   {10, 0, 0},  {0, 10, 0},  {0, 0, 10}, {-10, 0, 0},
@@ -86,7 +90,7 @@ static void test_large_fan(void) {
     int32_t(*lattice)[3] = calloc(N + 2, sizeof *lattice);
     uint32_t(*t)[3] = calloc(2 * N, sizeof *t);
     if (!CHECK(lattice && t)) return;
-    for (int32_t k = 0; k < N; k++) {                        /* a diamond: convex, its sides straight */
+    for (int32_t k = 0; k < N; k++) { /* a diamond: convex, its sides straight */
         int32_t side = k / (N / 4), s = k % (N / 4), rest = N / 4 - s;
         lattice[k][0] = side == 0 ? rest : side == 1 ? -s : side == 2 ? -rest : s;
         lattice[k][1] = side == 0 ? s : side == 1 ? rest : side == 2 ? -s : -rest;
@@ -100,7 +104,7 @@ static void test_large_fan(void) {
     CHECK_EQ(faults(&r), 0);
     CHECK_EQ(r.euler, 2);
     CHECK_EQ(r.components, 1);
-    lattice[N + 1][2] = 778;                                 /* now the lower apex is above the upper one: all touch or cross */
+    lattice[N + 1][2] = 778; /* now the lower apex is above the upper one: all touch or cross */
     r = check_mesh(lattice, N + 2, t, 2 * N);
     CHECK_EQ(r.self_intersections, 0);
     lattice[N + 1][2] = 777;
@@ -114,7 +118,8 @@ static void test_large_fan(void) {
 static void test_float_duplicates(void) {
     int32_t lattice[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 5}};
     lathe_mesh mesh = {4, 0, lattice, NULL};
-    lathe_transform fine = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}}, coarse = {{{1, 0, 0, 1e9}, {0, 1, 0, 0}, {0, 0, -0.0, 0}}};
+    lathe_transform fine = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}},
+                    coarse = {{{1, 0, 0, 1e9}, {0, 1, 0, 0}, {0, 0, -0.0, 0}}};
     uint64_t count = 99;
     CHECK_EQ(lathe__mesh_float_duplicates(&count, &mesh, &fine), LATHE_OK);
     CHECK_EQ(count, 0);
@@ -123,7 +128,8 @@ static void test_float_duplicates(void) {
 }
 
 static void test_world(void) {
-    lathe_transform mirror = {{{0, -2, 0, 10}, {-3, 0, 0, 20}, {0, 0, 4, 30}}}, plain = {{{2, 0, 0, 0}, {0, 2, 0, 0}, {0, 0, 2, 0}}};
+    lathe_transform mirror = {{{0, -2, 0, 10}, {-3, 0, 0, 20}, {0, 0, 4, 30}}},
+                    plain = {{{2, 0, 0, 0}, {0, 2, 0, 0}, {0, 0, 2, 0}}};
     int32_t lattice[1][3] = {{1, 2, 3}};
     uint32_t t[1][3] = {{0, 1, 2}}, indices[3];
     float p[3];
@@ -174,7 +180,8 @@ static bool in_wedge(vec d, vec b, vec c, vec n) { return dot(cross(b, d), n) >=
 
 static bool wedges_meet(vec b, vec c, vec d, vec e) {
     vec n = cross(b, c), m = cross(d, e), l = cross(n, m), k = {-l.x, -l.y, -l.z};
-    if (!is_zero(l)) return (in_wedge(l, b, c, n) && in_wedge(l, d, e, m)) || (in_wedge(k, b, c, n) && in_wedge(k, d, e, m));
+    if (!is_zero(l))
+        return (in_wedge(l, b, c, n) && in_wedge(l, d, e, m)) || (in_wedge(k, b, c, n) && in_wedge(k, d, e, m));
     return in_wedge(d, b, c, n) || in_wedge(e, b, c, n) || in_wedge(b, d, e, m) || in_wedge(c, d, e, m);
 }
 
@@ -186,10 +193,13 @@ static bool brute_meet(const lathe_mesh *mesh, uint32_t first, uint32_t second) 
         p[k] = make(mesh->lattice[s[k]]);
         q[k] = make(mesh->lattice[t[k]]);
     }
-    if (is_zero(cross(minus(p[1], p[0]), minus(p[2], p[0]))) || is_zero(cross(minus(q[1], q[0]), minus(q[2], q[0])))) return false;
+    if (is_zero(cross(minus(p[1], p[0]), minus(p[2], p[0]))) || is_zero(cross(minus(q[1], q[0]), minus(q[2], q[0]))))
+        return false;
     for (int k = 0; k < 3; k++) {
-        if (s[k] == t[0] || s[k] == t[1] || s[k] == t[2]) common[shared++] = k;
-        else other_s = k;
+        if (s[k] == t[0] || s[k] == t[1] || s[k] == t[2])
+            common[shared++] = k;
+        else
+            other_s = k;
         if (t[k] != s[0] && t[k] != s[1] && t[k] != s[2]) other_t = k;
     }
     if (shared == 3) return true;
@@ -200,7 +210,8 @@ static bool brute_meet(const lathe_mesh *mesh, uint32_t first, uint32_t second) 
         return is_zero(cross(n, m)) && dot(n, m) > 0;
     }
     int k = common[0], l = t[0] == s[k] ? 0 : t[1] == s[k] ? 1 : 2;
-    return wedges_meet(minus(p[(k + 1) % 3], a), minus(p[(k + 2) % 3], a), minus(q[(l + 1) % 3], a), minus(q[(l + 2) % 3], a));
+    return wedges_meet(minus(p[(k + 1) % 3], a), minus(p[(k + 2) % 3], a), minus(q[(l + 1) % 3], a),
+                       minus(q[(l + 2) % 3], a));
 }
 
 /* The same mesh at several scales: within 16 voxels, beyond, and at the ends of int32, where doubles no longer suffice. */
@@ -244,8 +255,9 @@ static void test_orientation(void) {
         wrong += lathe__orient3d(a, b, c, d) != 0;
         vec n = cross(minus(make(b), make(a)), minus(make(c), make(a)));
         d[2]++;
-        int sign = (n.z < 0) - (n.z > 0);                     /* seen from above, counter-clockwise a, b, c: negative */
-        wrong += lathe__orient3d(a, b, c, d) != sign || lathe__orient3d(b, a, c, d) != -sign || lathe__orient3d(b, c, a, d) != sign;
+        int sign = (n.z < 0) - (n.z > 0); /* seen from above, counter-clockwise a, b, c: negative */
+        wrong += lathe__orient3d(a, b, c, d) != sign || lathe__orient3d(b, a, c, d) != -sign ||
+                 lathe__orient3d(b, c, a, d) != sign;
     }
     CHECK_EQ(wrong, 0);
 }

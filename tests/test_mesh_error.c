@@ -7,7 +7,12 @@
 static const double pi = 3.14159265358979323846;
 
 /* A ball of radius r mm around the middle of a volume whose values fall linearly with the distance: its isosurface at 100. */
-typedef struct ball { lathe_volume volume; lathe_mask mask; lathe_axis axis; double r, middle[3]; } ball;
+typedef struct ball {
+    lathe_volume volume;
+    lathe_mask mask;
+    lathe_axis axis;
+    double r, middle[3];
+} ball;
 
 static double distance_at(const ball *b, const int32_t voxel[3]) {
     double sum = 0;
@@ -56,7 +61,8 @@ static ball make_ball(double r, const int32_t dims[3], const double affine[3][4]
         for (int j = 0; j < 3; j++) b.middle[i] += affine[i][j] * (0.5 * (dims[j] - 1) + 0.123 * (j + 1));
     }
     for (int j = 0; j < 3; j++)
-        b.volume.spacing[j] = sqrt(affine[0][j] * affine[0][j] + affine[1][j] * affine[1][j] + affine[2][j] * affine[2][j]);
+        b.volume.spacing[j] =
+            sqrt(affine[0][j] * affine[0][j] + affine[1][j] * affine[1][j] + affine[2][j] * affine[2][j]);
     b.volume.values = malloc(sizeof(float) * (size_t)dims[0] * (size_t)dims[1] * (size_t)dims[2]);
     if (!b.volume.values) abort();
     for (int32_t z = 0; z < dims[2]; z++)
@@ -120,7 +126,8 @@ static lathe_metrics measure(const ball *b, const lathe_reference *reference, do
 }
 
 static void near_to(double value, double expected, double tolerance) {
-    if (!CHECK(fabs(value - expected) <= tolerance)) fprintf(stderr, "  %g, expected %g +- %g\n", value, expected, tolerance);
+    if (!CHECK(fabs(value - expected) <= tolerance))
+        fprintf(stderr, "  %g, expected %g +- %g\n", value, expected, tolerance);
 }
 
 static void test_ball(const int32_t dims[3], const double affine[3][4], double r, double voxel, lathe_axis axis) {
@@ -183,7 +190,8 @@ static void test_box(void) {
     uint32_t t[12][3] = {{0, 1, 3}, {0, 3, 2}, {4, 7, 5}, {4, 6, 7}, {0, 5, 1}, {0, 4, 5},
                          {2, 3, 7}, {2, 7, 6}, {0, 2, 6}, {0, 6, 4}, {1, 5, 7}, {1, 7, 3}};
     for (int k = 0; k < 8; k++)
-        for (int i = 0; i < 3; i++) to_lattice(lattice[k], &b, (const double[3]){k & 1 ? 11 : -1, k & 2 ? 11 : -1, k & 4 ? 11 : -1});
+        for (int i = 0; i < 3; i++)
+            to_lattice(lattice[k], &b, (const double[3]){k & 1 ? 11 : -1, k & 2 ? 11 : -1, k & 4 ? 11 : -1});
     lathe_mesh mesh = {8, 12, lattice, t};
     lathe_metrics m = {0};
     CHECK_EQ(lathe__reference_measure(&m, reference, &mesh, 20000), LATHE_OK);
@@ -213,7 +221,10 @@ static void test_box(void) {
 
 /* ---- marching cubes are closed and hold the right volume, whatever the mask ---- */
 
-typedef struct welded { lathe_mesh mesh; double volume; } welded;
+typedef struct welded {
+    lathe_mesh mesh;
+    double volume;
+} welded;
 
 static int compare_points(const void *a, const void *b) {
     const int32_t *p = a, *q = b;
@@ -235,7 +246,8 @@ static welded weld(const lathe_soup *soup) {
         for (int c = 0; c < 3; c++)
             for (int i = 0; i < 3; i++) {
                 p[c][i] = (double)soup->packets[k / 4].corner[c][i][k % 4];
-                all[3 * k + (size_t)c][i] = points[3 * k + (size_t)c][i] = (int32_t)(p[c][i] * 2);   /* middles of edges: exact */
+                all[3 * k + (size_t)c][i] = points[3 * k + (size_t)c][i] =
+                    (int32_t)(p[c][i] * 2); /* middles of edges: exact */
             }
         for (int i = 0; i < 3; i++) {
             int j = (i + 1) % 3, l = (i + 2) % 3;
@@ -307,7 +319,7 @@ static void test_diagonals(void) {
     CHECK_EQ(r.components, 2);
     CHECK_EQ(r.euler, 4);
     CHECK_EQ(r.boundary_edges + r.nonmanifold_edges + r.misoriented_edges + r.nonmanifold_vertices, 0);
-    near_to(s.volume, 2 * 1.0 / 6, 1e-6);                     /* outward: the octahedra's volume, positive */
+    near_to(s.volume, 2 * 1.0 / 6, 1e-6); /* outward: the octahedra's volume, positive */
     lathe_mesh_free(&s.mesh);
     lathe__mask_free(&mask);
 }
