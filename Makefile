@@ -16,6 +16,7 @@ endif
 CLANG ?= clang
 CLANGXX ?= clang++
 WASM_LD ?= wasm-ld
+PARALLEL = $(if $(filter -j% --jobserver%,$(MAKEFLAGS)),,-j$(shell nproc 2>/dev/null || echo 2))
 
 # ---- sources: found by wildcard, but for the decoder that becomes wasm -------------------------------------------------
 
@@ -139,7 +140,7 @@ BIND ?= 127.0.0.1
 .PHONY: demo
 demo: ## install what is missing, bake a brain and an atlas, serve them on http://127.0.0.1:8080/
 	@tests/scripts/setup.sh demo
-	@$(MAKE) --no-print-directory all config=release
+	@$(MAKE) --no-print-directory $(PARALLEL) all config=release
 	@BIND=$(BIND) PORT=$(PORT) tests/scripts/demo.sh
 
 # ---- tests -------------------------------------------------------------------------------------------------------------
@@ -150,7 +151,7 @@ test: ## install what is missing, build, run every test; ends with "N passed, N 
 	@tests/scripts/run_tests.sh
 
 test-programs: all $(UNIT_TESTS:%=$(B)/tests/%) $(CHECKS:%=$(B)/tests/%) $(B)/tests/make_phantom
-sanitize-programs: $(UNIT_TESTS:%=$(B)/tests/%) $(B)/lathe
+sanitize-programs: $(UNIT_TESTS:%=$(B)/tests/%) $(B)/tests/make_phantom $(B)/lathe
 
 sanitize: ## the C tests under AddressSanitizer and UBSan
 	@tests/scripts/run_tests.sh sanitize
@@ -161,7 +162,7 @@ fuzzers: $(FUZZERS:%=$(B)/tests/%)
 
 bench: ## measure the figures of the README (needs python3-vtk9); prints the table
 	@tests/scripts/setup.sh bench
-	@$(MAKE) --no-print-directory all config=release
+	@$(MAKE) --no-print-directory $(PARALLEL) all config=release
 	@tests/bench/bench.py
 
 TEST_HELPERS := $(patsubst %.c,$(B)/%.o,$(wildcard tests/phantom.c))

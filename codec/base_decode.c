@@ -28,8 +28,8 @@ static bool get_star(lathe_star *star, lathe_arena *arena, lathe_range_decoder *
     if (log_rays < 3 || log_rays > 7) return false;
     star->rays = (uint16_t)(1 << log_rays);
     for (int k = 0; k < 2; k++) {
-        int32_t c = (parent ? parent->centre[k] : frame->size[k]) + get_number(d, &m[parent ? LATHE_BASE_CENTRE : LATHE_BASE_CENTRE_NEW]);
-        if (c < 0 || c > 2 * frame->size[k]) return false;
+        int32_t c = (parent ? parent->centre[k] : frame->size[k] / 2) + get_number(d, &m[parent ? LATHE_BASE_CENTRE : LATHE_BASE_CENTRE_NEW]);
+        if (c < 0 || c > frame->size[k]) return false;
         star->centre[k] = c;
     }
     star->radius = LATHE_NEW(arena, uint16_t, star->rays);
@@ -46,7 +46,7 @@ static bool get_star(lathe_star *star, lathe_arena *arena, lathe_range_decoder *
 lathe_status lathe__base_decode(lathe_star_slice *slices, uint32_t count, lathe_arena *arena, lathe_range_decoder *d,
                                 const lathe_mask *frame) {
     lathe_number_model m[LATHE_BASE_MODELS];
-    for (int i = 0; i < LATHE_BASE_MODELS; i++) lathe__number_reset(&m[i]);
+    lathe__base_models(m);
     for (uint32_t s = 0; s < count; s++) {
         const lathe_star_slice *before = s ? &slices[s - 1] : NULL;
         int32_t loops = get_number(d, &m[LATHE_BASE_LOOPS]) + (before ? (int32_t)before->count : 1);

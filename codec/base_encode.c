@@ -27,7 +27,7 @@ static void put_star(lathe_range_encoder *e, lathe_number_model *m, const lathe_
     put_number(e, &m[LATHE_BASE_HOLE], (star->hole ? 1 : 0) - (parent && parent->hole ? 1 : 0));
     put_number(e, &m[LATHE_BASE_RAYS], __builtin_ctz(star->rays) - (parent ? __builtin_ctz(parent->rays) : 3));
     for (int k = 0; k < 2; k++)
-        put_number(e, &m[parent ? LATHE_BASE_CENTRE : LATHE_BASE_CENTRE_NEW], star->centre[k] - (parent ? parent->centre[k] : frame->size[k]));
+        put_number(e, &m[parent ? LATHE_BASE_CENTRE : LATHE_BASE_CENTRE_NEW], star->centre[k] - (parent ? parent->centre[k] : frame->size[k] / 2));
     for (uint32_t i = 0; i < star->rays; i++)
         put_number(e, &m[parent ? LATHE_BASE_RADIUS_PARENT : i ? LATHE_BASE_RADIUS_ALONE : LATHE_BASE_RADIUS_FIRST],
                    star->radius[i] - lathe__predict_radius(star, parent, i, 16));
@@ -35,7 +35,7 @@ static void put_star(lathe_range_encoder *e, lathe_number_model *m, const lathe_
 
 lathe_status lathe__base_encode(lathe_range_encoder *e, const lathe_star_slice *slices, uint32_t count, const lathe_mask *frame) {
     lathe_number_model m[LATHE_BASE_MODELS];
-    for (int i = 0; i < LATHE_BASE_MODELS; i++) lathe__number_reset(&m[i]);
+    lathe__base_models(m);
     for (uint32_t s = 0; s < count; s++) {
         const lathe_star_slice *before = s ? &slices[s - 1] : NULL;
         put_number(e, &m[LATHE_BASE_LOOPS], (int32_t)slices[s].count - (before ? (int32_t)before->count : 1));

@@ -14,7 +14,7 @@ static int64_t distance(lathe_point a, lathe_point b) {
 
 static lathe_status fit_radii(lathe_star *star, lathe_arena *arena, const lathe_point *points, uint32_t count, int32_t step) {
     uint32_t fine = (uint32_t)star->rays * FINER, crossing_count;
-    lathe_point centre = {star->centre[0] * (LATHE_LATTICE_ONE / 2), star->centre[1] * (LATHE_LATTICE_ONE / 2)};
+    lathe_point centre = {star->centre[0] * LATHE_LATTICE_ONE, star->centre[1] * LATHE_LATTICE_ONE};
     int64_t *outermost = LATHE_NEW(arena, int64_t, fine);
     star->radius = LATHE_NEW(arena, uint16_t, star->rays);
     if (!outermost || !star->radius) return LATHE_ERR_MEMORY;
@@ -101,7 +101,7 @@ static int64_t loop_area(const lathe_outline *o, uint32_t l, int64_t *reach, lat
 /* The star of the slice before whose centre lies nearest, if it is near and free. */
 static uint8_t find_parent(const lathe_star *star, const lathe_star_slice *before, uint64_t taken, int64_t reach) {
     uint8_t best = 0;
-    int64_t least = 2 * reach / (LATHE_LATTICE_ONE / 2);
+    int64_t least = 2 * reach / LATHE_LATTICE_ONE;
     for (uint32_t i = 0; before && i < before->count; i++) {
         const lathe_star *other = &before->stars[i];
         int64_t dx = star->centre[0] - other->centre[0], dy = star->centre[1] - other->centre[1];
@@ -126,16 +126,16 @@ lathe_status lathe__base_fit(lathe_star_slice *out, lathe_arena *arena, const la
     for (uint32_t i = 0; i < loops->loop_count && out->count < LATHE_BASE_MAX_LOOPS; i++) {
         const lathe_loop *loop = &loops->loops[order[i].loop];
         /* A loop narrower than the distance of two base slices is left to the next level. */
-        if (out->count && order[i].area < (int64_t)stride * stride * 16) break;
+        if (out->count && order[i].area < (int64_t)stride * stride * 4) break;
         lathe_star *star = &out->stars[out->count];
         lathe_point centre;
         lathe_status status = lathe__loop_centre(&centre, arena, loops->points + loop->first, loop->count);
         if (status) return status;
         loop_area(loops, order[i].loop, &reach, centre);
-        *star = (lathe_star){.centre = {(centre.x + LATHE_LATTICE_ONE / 4) / (LATHE_LATTICE_ONE / 2), (centre.y + LATHE_LATTICE_ONE / 4) / (LATHE_LATTICE_ONE / 2)},
+        *star = (lathe_star){.centre = {(centre.x + LATHE_LATTICE_ONE / 2) / LATHE_LATTICE_ONE, (centre.y + LATHE_LATTICE_ONE / 2) / LATHE_LATTICE_ONE},
                              .hole = loop->hole};
         uint32_t rays = LATHE_BASE_MIN_RAYS;
-        while (rays < LATHE_BASE_MAX_RAYS && (int64_t)rays * stride * LATHE_LATTICE_ONE < reach * 44 / 7 * 3 / 4) rays *= 2;
+        while (rays < LATHE_BASE_MAX_RAYS && (int64_t)rays * stride * LATHE_LATTICE_ONE < reach * 22 / 7) rays *= 2;
         star->rays = (uint16_t)rays;
         status = fit_radii(star, arena, loops->points + loop->first, loop->count, step);
         if (status) return status;

@@ -7,7 +7,7 @@
 enum { LATHE_BASE_MAX_LOOPS = 64, LATHE_BASE_MIN_RAYS = 8, LATHE_BASE_MAX_RAYS = 128 };
 
 typedef struct lathe_star {
-    int32_t centre[2];         /* in half pixels of the mask's frame */
+    int32_t centre[2];         /* in pixels of the mask's frame */
     uint16_t rays;             /* a power of two */
     bool hole;
     uint8_t parent;            /* loop of the slice before that it continues, plus 1; 0: none */
@@ -15,9 +15,9 @@ typedef struct lathe_star {
 } lathe_star;
 typedef struct lathe_star_slice { uint32_t count; lathe_star *stars; } lathe_star_slice;
 
-/* A radius step in lattice units: an eighth of the slice distance, at least a quarter voxel. */
+/* A radius step in lattice units: a quarter of the slice distance, at least one voxel. */
 static inline int32_t lathe__radius_step(int32_t stride) {
-    return stride < 2 ? LATHE_LATTICE_ONE / 4 : stride * (LATHE_LATTICE_ONE / 8);
+    return stride < 4 ? LATHE_LATTICE_ONE : stride * (LATHE_LATTICE_ONE / 4);
 }
 /* The polygons of a slice's stars, as encoder and decoder both see them. Points get arena memory. */
 lathe_status lathe__star_outline(lathe_outline *out, lathe_arena *arena, const lathe_star_slice *slice, int32_t step, uint32_t seed);
@@ -33,14 +33,13 @@ static inline void lathe__bit_learn(lathe_bit_model *m, int bit) {
     int32_t p = m->p1 + (bit ? 65535 - m->p1 : -(int32_t)m->p1) / rate;
     m->p1 = (uint16_t)(p < 512 ? 512 : p > 65023 ? 65023 : p);
 }
-static inline void lathe__number_reset(lathe_number_model *m) {
-    for (int i = 0; i < LATHE_NUMBER_MODELS; i++) m->bit[i] = (lathe_bit_model){32768, 0};
-}
 /* Contexts of a base shape's numbers. */
 enum {
     LATHE_BASE_LOOPS, LATHE_BASE_PARENT, LATHE_BASE_HOLE, LATHE_BASE_RAYS, LATHE_BASE_CENTRE_NEW, LATHE_BASE_CENTRE,
     LATHE_BASE_RADIUS_FIRST, LATHE_BASE_RADIUS_ALONE, LATHE_BASE_RADIUS_PARENT, LATHE_BASE_MODELS
 };
+/* What is usual before anything is known: most stars go on from slice to slice, with radii and centres that differ little. */
+void lathe__base_models(lathe_number_model models[LATHE_BASE_MODELS]);
 /* What a radius is predicted to be: the star it continues tells, or the ray before. */
 int32_t lathe__predict_radius(const lathe_star *star, const lathe_star *parent, uint32_t ray, int32_t start);
 

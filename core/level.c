@@ -4,7 +4,7 @@
 
 uint32_t lathe__choose_levels(int32_t slices) {
     uint32_t levels = 2;
-    while (levels < LATHE_MAX_LEVELS && slices >= 10 << (levels - 1)) levels++;
+    while (levels < LATHE_MAX_LEVELS && slices > (int32_t)1 << 2 * (levels - 1)) levels++;
     return levels;
 }
 

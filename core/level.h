@@ -14,7 +14,7 @@ typedef struct lathe_level_plan {
     uint32_t kept_count;
 } lathe_level_plan;
 
-/* As many levels as leave the base shape at least about five slices; 2 .. LATHE_MAX_LEVELS. */
+/* So many that the base shape has at most as many slices as there are slices between them; 2 .. LATHE_MAX_LEVELS. */
 uint32_t lathe__choose_levels(int32_t slices);
 static inline int32_t lathe__level_stride(const lathe_level_plan *plan, uint32_t level) {
     return (int32_t)1 << (plan->level_count - 1 - level);

@@ -18,7 +18,9 @@ int lathe__buffer_append(void *context, const void *bytes, size_t size) {
     return 0;
 }
 
-int lathe__buffer_text(lathe_buffer *buffer, const char *text) { return lathe__buffer_append(buffer, text, strlen(text)); }
+int lathe__buffer_text(lathe_buffer *buffer, const char *text) {
+    return lathe__buffer_append(buffer, text, strlen(text));
+}
 
 void lathe__buffer_free(lathe_buffer *buffer) {
     free(buffer->bytes);
@@ -29,7 +31,8 @@ int lathe__buffer_base64(lathe_buffer *buffer, const uint8_t *bytes, size_t size
     static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     for (size_t i = 0; i < size; i += 3) {
         size_t left = size - i;
-        uint32_t three = (uint32_t)bytes[i] << 16 | (left > 1 ? (uint32_t)bytes[i + 1] << 8 : 0) | (left > 2 ? bytes[i + 2] : 0);
+        uint32_t three =
+            (uint32_t)bytes[i] << 16 | (left > 1 ? (uint32_t)bytes[i + 1] << 8 : 0) | (left > 2 ? bytes[i + 2] : 0);
         char four[4] = {digits[three >> 18], digits[three >> 12 & 63], left > 1 ? digits[three >> 6 & 63] : '=',
                         left > 2 ? digits[three & 63] : '='};
         if (lathe__buffer_append(buffer, four, 4)) return 1;

@@ -46,7 +46,10 @@ static lathe_status step_through(lathe_decoder *decoder, bool all_levels, decode
     }
 }
 
-static lathe_status last_meshes(lathe_decoder *decoder, bool hash, decode_result *result) {
+/* What to do with the last meshes, once they are built. */
+typedef enum hashing { HASH_NONE, HASH_ALL, HASH_EACH } hashing;
+
+static lathe_status last_meshes(lathe_decoder *decoder, hashing hash, decode_result *result) {
     uint32_t count = lathe_decoder_structures(decoder);
     result->hash = LATHE_FNV_START;
     for (uint32_t i = 0; i < count; i++) {
@@ -54,12 +57,14 @@ static lathe_status last_meshes(lathe_decoder *decoder, bool hash, decode_result
         if (!mesh) return LATHE_ERR_FORMAT;
         result->last_triangles += mesh->triangle_count;
         result->vertices += mesh->vertex_count;
-        if (hash) result->hash = lathe__hash_mesh(result->hash, mesh);
+        if (hash == HASH_ALL) result->hash = lathe__hash_mesh(result->hash, mesh);
+        if (hash == HASH_EACH) printf("%016llx\n", (unsigned long long)lathe__hash_mesh(LATHE_FNV_START, mesh));
     }
     return LATHE_OK;
 }
 
-static lathe_status decode_once(decode_result *out, const uint8_t *stream, size_t size, bool all_levels, bool hash, lathe_error *err) {
+static lathe_status decode_once(decode_result *out, const uint8_t *stream, size_t size, bool all_levels, hashing hash,
+                                lathe_error *err) {
     decode_result result;
     memset(&result, 0, sizeof result);
     double start = cpu_seconds();
@@ -82,7 +87,7 @@ static lathe_status decode_best(decode_result *out, const uint8_t *stream, size_
                                 lathe_error *err) {
     for (int i = 0; i < repeats; i++) {
         decode_result result;
-        lathe_status status = decode_once(&result, stream, size, all_levels, false, err);
+        lathe_status status = decode_once(&result, stream, size, all_levels, HASH_NONE, err);
         if (status) return status;
         if (i == 0 || result.seconds < out->seconds) *out = result;
     }
@@ -93,7 +98,7 @@ static lathe_status measure(decode_result *last, decode_result *all, const lathe
     size_t size;
     const uint8_t *stream = lathe__whole_stream(model, &size);
     decode_result hashed;
-    lathe_status status = decode_once(&hashed, stream, size, false, true, err);
+    lathe_status status = decode_once(&hashed, stream, size, false, HASH_ALL, err);
     if (!status) status = decode_best(last, stream, size, false, repeats, err);
     if (!status) status = decode_best(all, stream, size, true, repeats, err);
     if (!status) last->hash = hashed.hash;
@@ -140,7 +145,9 @@ static int run_bench(int argc, char **argv) {
 }
 
 static int run_hash(int argc, char **argv) {
-    int count, status = lathe__parse_options(&lathe__command_hash, argc, argv, NULL, 0, &count);
+    bool each = false;
+    const lathe_option options[] = {LATHE_OPTION_FLAG("each", &each, true)};
+    int count, status = lathe__parse_options(&lathe__command_hash, argc, argv, options, 1, &count);
     if (status != LATHE_PARSED) return status;
     if (count != 1) return lathe__usage_error(&lathe__command_hash, "one FILE is needed");
     lathe_model *model = NULL;
@@ -150,11 +157,11 @@ static int run_hash(int argc, char **argv) {
     if (!result) {
         size_t size;
         const uint8_t *stream = lathe__whole_stream(model, &size);
-        result = decode_once(&decoded, stream, size, false, true, &err);
+        result = decode_once(&decoded, stream, size, false, each ? HASH_EACH : HASH_ALL, &err);
     }
     lathe_model_close(&model);
     if (result) return lathe__status_error("hash", argv[1], result, &err);
-    printf("%016llx\n", (unsigned long long)decoded.hash);
+    if (!each) printf("%016llx\n", (unsigned long long)decoded.hash);
     return LATHE_EXIT_OK;
 }
 
@@ -167,6 +174,7 @@ const lathe_command lathe__command_bench = {
 
 const lathe_command lathe__command_hash = {
     "hash", NULL,
-    "Usage: lathe hash FILE\n\n"
-    "Prints the FNV-1a hash (64 bit) of every structure's last mesh: positions (int32), then triangles (uint32), little-endian.\n",
+    "Usage: lathe hash [--each] FILE\n\n"
+    "Prints the FNV-1a hash (64 bit) of every structure's last mesh: positions (int32), then triangles (uint32), little-endian.\n"
+    "With --each one number for each structure, each begun anew.\n",
     run_hash};

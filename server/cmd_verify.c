@@ -204,7 +204,7 @@ static void expect_nothing(verification *v) {
 /* A volume that cannot be baked so is another one: every level differs. Levels that the second bake has not, differ too. */
 static lathe_status compare_with_encoded(verification *v, const lathe_volume *volume, lathe_error *err) {
     expect_nothing(v);
-    lathe_bytes bytes = {NULL, 0, 0};
+    lathe_rebaked bytes = {NULL, 0, 0};
     lathe_status status = lathe__rebake(&bytes, v->info, volume, err);
     if (status) return status == LATHE_ERR_MEMORY ? status : LATHE_OK;
     lathe_model *encoded = NULL;

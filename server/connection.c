@@ -1,12 +1,12 @@
-/* Deadlines of connections. libmicrohttpd's own timeout is one of inactivity: a client that drips a byte now and then would
- * stay for ever. Here every phase has an absolute end, and past it the socket is shut down; the library's thread sees the
- * end of the stream and frees the connection as if the client had left. */
+/* Deadlines of connections. libmicrohttpd's own timeout is one of inactivity: a client that drips a byte now and then
+ * would stay for ever. Here every phase has an absolute end, and past it the socket is shut down; the library's thread
+ * sees the end of the stream and frees the connection as if the client had left. */
 #include "service.h"
 #include <stdlib.h>
 #include <sys/socket.h>
 #include <time.h>
 
-enum { REPLY_MS = 30000, SLOWEST_BYTES_PER_MS = 4 };    /* a reply may take 30 s and 1 s more for each 4 KB */
+enum { REPLY_MS = 30000, SLOWEST_BYTES_PER_MS = 4 }; /* a reply may take 30 s and 1 s more for each 4 KB */
 
 int64_t lathe__now_ms(void) {
     struct timespec now;
@@ -23,7 +23,7 @@ static void add_peer(lathe_service *service, struct MHD_Connection *connection, 
         *socket_context = NULL;
         return;
     }
-    if (!peer) {                   /* without a deadline nobody is let in */
+    if (!peer) { /* without a deadline nobody is let in */
         shutdown(info->connect_fd, SHUT_RDWR);
         return;
     }
@@ -41,8 +41,10 @@ static void add_peer(lathe_service *service, struct MHD_Connection *connection, 
 /* Called before the socket is closed, so its number still is this peer's while the lock is held. */
 static void remove_peer(lathe_service *service, lathe_peer *peer) {
     pthread_mutex_lock(&service->peers_lock);
-    if (peer->previous) peer->previous->next = peer->next;
-    else service->peers = peer->next;
+    if (peer->previous)
+        peer->previous->next = peer->next;
+    else
+        service->peers = peer->next;
     if (peer->next) peer->next->previous = peer->previous;
     pthread_mutex_unlock(&service->peers_lock);
     free(peer);
@@ -50,7 +52,8 @@ static void remove_peer(lathe_service *service, lathe_peer *peer) {
 
 void lathe__peer_event(void *service, struct MHD_Connection *connection, void **socket_context,
                        enum MHD_ConnectionNotificationCode code) {
-    if (code == MHD_CONNECTION_NOTIFY_STARTED) add_peer(service, connection, socket_context);
+    if (code == MHD_CONNECTION_NOTIFY_STARTED)
+        add_peer(service, connection, socket_context);
     else if (*socket_context) {
         remove_peer(service, *socket_context);
         *socket_context = NULL;

@@ -3,11 +3,20 @@
 #include <stdio.h>
 #include <string.h>
 
-typedef struct format { const char *suffix, *type; } format;
-static const format FORMATS[] = {
-    {"drc", "application/octet-stream"}, {"glb", "model/gltf-binary"}, {"stl", "model/stl"}, {"ply", "application/octet-stream"}};
+typedef struct format {
+    const char *suffix, *type;
+} format;
+static const format FORMATS[] = {{"drc", "application/octet-stream"},
+                                 {"glb", "model/gltf-binary"},
+                                 {"stl", "model/stl"},
+                                 {"ply", "application/octet-stream"}};
 enum { DRC, GLB, STL, PLY, FORMAT_COUNT };
-typedef struct level { lathe_entry *entry; int64_t structure; uint32_t level; int format; } level;
+typedef struct level {
+    lathe_entry *entry;
+    int64_t structure;
+    uint32_t level;
+    int format;
+} level;
 
 static lathe_status write_mesh(lathe_buffer *out, const lathe_world_mesh *mesh, const level *l) {
     const lathe_model_info *info = l->entry->info;
@@ -47,21 +56,20 @@ static bool parse_name(const char *name, uint32_t *number, int *kind) {
     if (!dot || dot - name >= (int)sizeof digits) return false;
     memcpy(digits, name, (size_t)(dot - name));
     digits[dot - name] = 0;
-    for (*kind = 0; *kind < FORMAT_COUNT && strcmp(dot + 1, FORMATS[*kind].suffix); ++*kind) continue;
+    for (*kind = 0; *kind < FORMAT_COUNT && strcmp(dot + 1, FORMATS[*kind].suffix) != 0; ++*kind) continue;
     return *kind < FORMAT_COUNT && lathe__parse_number(digits, number);
 }
 
 static enum MHD_Result reply(lathe_request *request, level *l) {
     uint32_t last = lathe__entry_levels(l->entry, -1) - 1;
-    if (l->level > last)
-        return lathe__respond_problem(request, 404, "the model has levels 0..%u", last);
+    if (l->level > last) return lathe__respond_problem(request, 404, "the model has levels 0..%u", last);
     /* A structure that is complete earlier stays at its last level. */
     uint32_t own_last = lathe__entry_levels(l->entry, l->structure) - 1;
     if (l->level > own_last) l->level = own_last;
-    lathe_recipe recipe = {.type = FORMATS[l->format].type, .traits = LATHE_RANGES, .entry = l->entry, .build = build_level,
-                           .context = l};
-    snprintf(recipe.key, sizeof recipe.key, "%s:%s:level:%lld:%u:%d", l->entry->id, l->entry->hash, (long long)l->structure,
-             l->level, l->format);
+    lathe_recipe recipe = {
+        .type = FORMATS[l->format].type, .traits = LATHE_RANGES, .entry = l->entry, .build = build_level, .context = l};
+    snprintf(recipe.key, sizeof recipe.key, "%s:%s:level:%lld:%u:%d", l->entry->id, l->entry->hash,
+             (long long)l->structure, l->level, l->format);
     snprintf(recipe.file_name, sizeof recipe.file_name, "%s-%u.%s", l->entry->id, l->level, FORMATS[l->format].suffix);
     return lathe__respond(request, &recipe);
 }
@@ -71,9 +79,11 @@ enum MHD_Result lathe__handle_level(lathe_request *request) {
     level l = {lathe__request_entry(request, &result), -1, 0, 0};
     if (!l.entry) return result;
     if (!parse_name(request->captures[1], &l.level, &l.format))
-        result = lathe__respond_problem(request, 404, "a level is named {n}.drc, {n}.glb, {n}.stl or {n}.ply, n in 0..%u",
-                                        lathe__entry_levels(l.entry, -1) - 1);
-    else if (lathe__request_structure(request, l.entry, &l.structure, &result)) result = reply(request, &l);
+        result =
+            lathe__respond_problem(request, 404, "a level is named {n}.drc, {n}.glb, {n}.stl or {n}.ply, n in 0..%u",
+                                   lathe__entry_levels(l.entry, -1) - 1);
+    else if (lathe__request_structure(request, l.entry, &l.structure, &result))
+        result = reply(request, &l);
     lathe__entry_release(l.entry);
     return result;
 }

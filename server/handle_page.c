@@ -1,12 +1,15 @@
 /* /m/{model}: the viewer on one model in one response. The page as it was built has one placeholder, which becomes the
- * manifest and the base shape, so that the first bytes a browser gets are all it needs to draw. / : the same page without a
- * model; it then lists those there are. */
+ * manifest and the base shape, so that the first bytes a browser gets are all it needs to draw. / : the same page
+ * without a model; it then lists those there are. */
 #include "service.h"
 #include <stdio.h>
 #include <string.h>
 
 static const char PLACEHOLDER[] = "<!--LATHE_MODEL-->";
-typedef struct page { lathe_entry *entry; int64_t structure; } page;    /* entry NULL: no model */
+typedef struct page {
+    lathe_entry *entry;
+    int64_t structure;
+} page; /* entry NULL: no model */
 
 static lathe_status write_base(lathe_buffer *out, const page *p) {
     lathe_buffer base = {0};
@@ -19,10 +22,12 @@ static lathe_status write_base(lathe_buffer *out, const page *p) {
 static lathe_status write_model(lathe_buffer *out, const page *p) {
     json_t *manifest = lathe__manifest(p->entry, true, p->structure);
     lathe_status status = manifest ? LATHE_OK : LATHE_ERR_MEMORY;
-    if (!status && lathe__buffer_text(out, "<script type=\"application/json\" id=\"model\">")) status = LATHE_ERR_MEMORY;
+    if (!status && lathe__buffer_text(out, "<script type=\"application/json\" id=\"model\">"))
+        status = LATHE_ERR_MEMORY;
     if (!status) status = lathe__json_write(out, manifest);
     json_decref(manifest);
-    if (!status && lathe__buffer_text(out, "</script><script id=\"base\" type=\"text/plain\">")) status = LATHE_ERR_MEMORY;
+    if (!status && lathe__buffer_text(out, "</script><script id=\"base\" type=\"text/plain\">"))
+        status = LATHE_ERR_MEMORY;
     if (!status) status = write_base(out, p);
     if (!status && lathe__buffer_text(out, "</script>")) status = LATHE_ERR_MEMORY;
     return status;
@@ -31,7 +36,8 @@ static lathe_status write_model(lathe_buffer *out, const page *p) {
 static lathe_status build_page(lathe_body *body, void *context, lathe_error *err) {
     const page *p = context;
     const unsigned char *at = memmem(lathe_viewer_html, lathe_viewer_html_size, PLACEHOLDER, sizeof PLACEHOLDER - 1);
-    if (!at) return lathe_fail(err, LATHE_ERR_FORMAT, "the viewer page was built without its placeholder: run `make web`");
+    if (!at)
+        return lathe_fail(err, LATHE_ERR_FORMAT, "the viewer page was built without its placeholder: run `make web`");
     size_t before = (size_t)(at - lathe_viewer_html), skipped = before + sizeof PLACEHOLDER - 1;
     lathe_buffer out = {0};
     lathe_status status = lathe__buffer_append(&out, lathe_viewer_html, before) ? LATHE_ERR_MEMORY : LATHE_OK;
@@ -50,8 +56,11 @@ static lathe_status build_page(lathe_body *body, void *context, lathe_error *err
 
 enum MHD_Result lathe__handle_index(lathe_request *request) {
     page none = {NULL, -1};
-    lathe_recipe recipe = {.key = "index", .type = "text/html; charset=utf-8", .traits = LATHE_COMPRESSIBLE | LATHE_PAGE,
-                           .build = build_page, .context = &none};
+    lathe_recipe recipe = {.key = "index",
+                           .type = "text/html; charset=utf-8",
+                           .traits = LATHE_COMPRESSIBLE | LATHE_PAGE,
+                           .build = build_page,
+                           .context = &none};
     return lathe__respond(request, &recipe);
 }
 
@@ -60,8 +69,11 @@ enum MHD_Result lathe__handle_page(lathe_request *request) {
     page p = {lathe__request_entry(request, &result), -1};
     if (!p.entry) return result;
     if (lathe__request_structure(request, p.entry, &p.structure, &result)) {
-        lathe_recipe recipe = {.type = "text/html; charset=utf-8", .traits = LATHE_COMPRESSIBLE | LATHE_PAGE, .entry = p.entry,
-                               .build = build_page, .context = &p};
+        lathe_recipe recipe = {.type = "text/html; charset=utf-8",
+                               .traits = LATHE_COMPRESSIBLE | LATHE_PAGE,
+                               .entry = p.entry,
+                               .build = build_page,
+                               .context = &p};
         snprintf(recipe.key, sizeof recipe.key, "%s:%s:page:%lld", p.entry->id, p.entry->hash, (long long)p.structure);
         result = lathe__respond(request, &recipe);
     }

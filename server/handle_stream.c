@@ -1,9 +1,13 @@
-/* /models/{m}/stream, /models/{m}/deltas/{n}.lathe, /models/{m}.lathe: the archive's own bytes. Of all structures they are
- * sent from the mapped file as they lie there. */
+/* /models/{m}/stream, /models/{m}/deltas/{n}.lathe, /models/{m}.lathe: the archive's own bytes. Of all structures they
+ * are sent from the mapped file as they lie there. */
 #include "service.h"
 #include <stdio.h>
 
-typedef struct stream { lathe_entry *entry; int64_t structure; uint32_t from, to; } stream;
+typedef struct stream {
+    lathe_entry *entry;
+    int64_t structure;
+    uint32_t from, to;
+} stream;
 
 static void lend(lathe_body *body, lathe_entry *entry, size_t offset, size_t size) {
     size_t whole;
@@ -37,15 +41,19 @@ static lathe_status build_stream(lathe_body *body, void *context, lathe_error *e
 }
 
 static enum MHD_Result reply(lathe_request *request, stream *s) {
-    lathe_recipe recipe = {.type = "application/octet-stream", .traits = LATHE_RANGES, .entry = s->entry, .build = build_stream,
+    lathe_recipe recipe = {.type = "application/octet-stream",
+                           .traits = LATHE_RANGES,
+                           .entry = s->entry,
+                           .build = build_stream,
                            .context = s};
-    snprintf(recipe.key, sizeof recipe.key, "%s:%s:stream:%lld:%u:%u", s->entry->id, s->entry->hash, (long long)s->structure,
-             s->from, s->to);
+    snprintf(recipe.key, sizeof recipe.key, "%s:%s:stream:%lld:%u:%u", s->entry->id, s->entry->hash,
+             (long long)s->structure, s->from, s->to);
     return lathe__respond(request, &recipe);
 }
 
 /* A level out of the query: *level stays if it is not given. */
-static bool query_level(lathe_request *request, const char *name, uint32_t last, uint32_t *out, enum MHD_Result *result) {
+static bool query_level(lathe_request *request, const char *name, uint32_t last, uint32_t *out,
+                        enum MHD_Result *result) {
     const char *text = lathe__request_query(request, name);
     if (!text || lathe__parse_number(text, out)) return true;
     *result = lathe__respond_problem(request, 400, "%s is not a level: the model has levels 0..%u", name, last);
@@ -61,8 +69,10 @@ enum MHD_Result lathe__handle_stream(lathe_request *request) {
         lathe__request_structure(request, s.entry, &s.structure, &result)) {
         if (s.to > last || !lathe__request_query(request, "to")) s.to = last;
         if (s.from > last + 1 || (s.from > s.to && s.from <= last))
-            result = lathe__respond_problem(request, 400, "from must not be beyond to: the model has levels 0..%u", last);
-        else result = reply(request, &s);
+            result =
+                lathe__respond_problem(request, 400, "from must not be beyond to: the model has levels 0..%u", last);
+        else
+            result = reply(request, &s);
     }
     lathe__entry_release(s.entry);
     return result;
@@ -96,7 +106,10 @@ enum MHD_Result lathe__handle_archive(lathe_request *request) {
     enum MHD_Result result;
     lathe_entry *entry = lathe__request_entry(request, &result);
     if (!entry) return result;
-    lathe_recipe recipe = {.type = "application/octet-stream", .traits = LATHE_RANGES, .entry = entry, .build = build_archive,
+    lathe_recipe recipe = {.type = "application/octet-stream",
+                           .traits = LATHE_RANGES,
+                           .entry = entry,
+                           .build = build_archive,
                            .context = entry};
     snprintf(recipe.key, sizeof recipe.key, "%s:%s:archive", entry->id, entry->hash);
     snprintf(recipe.file_name, sizeof recipe.file_name, "%s.lathe", entry->id);

@@ -5,7 +5,7 @@
 #include <string.h>
 
 static int take_bytes(void *context, const void *bytes, size_t size) {
-    lathe_bytes *out = context;
+    lathe_rebaked *out = context;
     if (size > out->capacity - out->size) {
         size_t capacity = out->capacity ? out->capacity : 1 << 16;
         while (capacity - out->size < size) {
@@ -33,7 +33,7 @@ static lathe_bake_structure *same_structures(const lathe_model_info *info) {
     return list;
 }
 
-lathe_status lathe__rebake(lathe_bytes *out, const lathe_model_info *info, const lathe_volume *volume, lathe_error *err) {
+lathe_status lathe__rebake(lathe_rebaked *out, const lathe_model_info *info, const lathe_volume *volume, lathe_error *err) {
     lathe_bake_structure *structures = same_structures(info);
     if (!structures) return LATHE_ERR_MEMORY;
     lathe_bake_options options;
@@ -47,7 +47,7 @@ lathe_status lathe__rebake(lathe_bytes *out, const lathe_model_info *info, const
         options.structures = structures;
         options.structure_count = info->structure_count;
     }
-    lathe_bytes bytes = {NULL, 0, 0};
+    lathe_rebaked bytes = {NULL, 0, 0};
     lathe_status status = lathe_bake(volume, &options, take_bytes, &bytes, err);
     free(structures);
     if (status) free(bytes.bytes);

@@ -1,5 +1,5 @@
-/* Representations: derived from immutable archives, built once, kept in memory up to a limit, oldest use out first. A reply
- * holds its bytes itself, so what leaves the cache while it is being sent lives until it is sent. */
+/* Representations: derived from immutable archives, built once, kept in memory up to a limit, oldest use out first. A
+ * reply holds its bytes itself, so what leaves the cache while it is being sent lives until it is sent. */
 #include "service.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,7 +8,7 @@
 enum { BUCKETS = 4096, BUILDING = 0, READY = 1, GONE = 2, MAX_COUNT = 16384, FIXED_COST = 4096 };
 struct lathe_cache {
     pthread_mutex_t lock;
-    pthread_cond_t settled;        /* some representation is not BUILDING any more */
+    pthread_cond_t settled; /* some representation is not BUILDING any more */
     size_t limit, size, count;
     lathe_representation *buckets[BUCKETS], *newest, *oldest;
 };
@@ -27,7 +27,9 @@ static uint64_t hash_key(const char *key) {
     return hash ^ hash >> 32;
 }
 
-static size_t cost(const lathe_representation *r) { return FIXED_COST + (r->body && r->body->owned ? r->body->size : 0); }
+static size_t cost(const lathe_representation *r) {
+    return FIXED_COST + (r->body && r->body->owned ? r->body->size : 0);
+}
 
 static void free_representation(lathe_representation *r) {
     for (int i = 0; i < 2; i++) {
@@ -40,18 +42,24 @@ static void free_representation(lathe_representation *r) {
 }
 
 static void unlink_use(lathe_cache *cache, lathe_representation *r) {
-    if (r->newer) r->newer->older = r->older;
-    else cache->newest = r->older;
-    if (r->older) r->older->newer = r->newer;
-    else cache->oldest = r->newer;
+    if (r->newer)
+        r->newer->older = r->older;
+    else
+        cache->newest = r->older;
+    if (r->older)
+        r->older->newer = r->newer;
+    else
+        cache->oldest = r->newer;
     r->newer = r->older = NULL;
 }
 
 static void link_use(lathe_cache *cache, lathe_representation *r) {
     r->older = cache->newest;
     r->newer = NULL;
-    if (r->older) r->older->newer = r;
-    else cache->oldest = r;
+    if (r->older)
+        r->older->newer = r;
+    else
+        cache->oldest = r;
     cache->newest = r;
 }
 
@@ -107,13 +115,14 @@ void lathe__cache_close(lathe_cache **cache) {
     *cache = NULL;
 }
 
-static lathe_status compress_body(lathe_body *body, lathe_cache *cache, const lathe_recipe *recipe, lathe_encoding encoding,
-                                  lathe_error *err) {
-    lathe_representation *plain;
+static lathe_status compress_body(lathe_body *body, lathe_cache *cache, const lathe_recipe *recipe,
+                                  lathe_encoding encoding, lathe_error *err) {
+    lathe_representation *plain = NULL;
     lathe_status status = lathe__cache_get(&plain, cache, recipe, LATHE_IDENTITY, err);
-    if (status) return status;
+    if (status || !plain) return status ? status : LATHE_ERR_MEMORY;
     lathe_buffer packed = {0};
-    status = lathe__compress(&packed, plain->body->bytes, plain->body->size, encoding, (recipe->traits & LATHE_PAGE) != 0);
+    status =
+        lathe__compress(&packed, plain->body->bytes, plain->body->size, encoding, (recipe->traits & LATHE_PAGE) != 0);
     lathe__cache_release(cache, plain);
     if (status) return lathe_fail(err, status, "compression failed");
     body->owned = packed.bytes;
@@ -148,7 +157,7 @@ static lathe_representation *new_representation(const lathe_recipe *recipe, lath
     r->encoding = encoding;
     r->entry = recipe->entry;
     memcpy(r->file_name, recipe->file_name, sizeof r->file_name);
-    r->references = 2;             /* the table's and the caller's */
+    r->references = 2; /* the table's and the caller's */
     return r;
 }
 
@@ -160,8 +169,8 @@ static lathe_representation *find(lathe_cache *cache, const char *key) {
 }
 
 /* Under the lock: what is READY, counted for the caller; or a new one that the caller has to build (*fresh). */
-static lathe_representation *find_or_add(lathe_cache *cache, const lathe_recipe *recipe, lathe_encoding encoding, const char *key,
-                                         bool *fresh) {
+static lathe_representation *find_or_add(lathe_cache *cache, const lathe_recipe *recipe, lathe_encoding encoding,
+                                         const char *key, bool *fresh) {
     lathe_representation *r;
     *fresh = false;
     while ((r = find(cache, key))) {

@@ -8,8 +8,8 @@
 #include <string.h>
 #include <strings.h>
 
-/* 0.9.75 cuts the query into parameters, 60 bytes of the connection's memory for each `&`, and hangs when that is used up.
- * We cut it ourselves, from a copy, and leave the library one parameter: the buffer is its own and writable. */
+/* 0.9.75 cuts the query into parameters, 60 bytes of the connection's memory for each `&`, and hangs when that is used
+ * up. We cut it ourselves, from a copy, and leave the library one parameter: the buffer is its own and writable. */
 static void join_query(const char *target) {
     for (char *p = (char *)(uintptr_t)target; *p; p++)
         if (*p == '&') *p = ' ';
@@ -35,7 +35,8 @@ static void client_address(char *out, size_t size, struct MHD_Connection *connec
     const struct sockaddr *address = info ? info->client_addr : NULL;
     const void *host = NULL;
     if (address && address->sa_family == AF_INET) host = &((const struct sockaddr_in *)(const void *)address)->sin_addr;
-    if (address && address->sa_family == AF_INET6) host = &((const struct sockaddr_in6 *)(const void *)address)->sin6_addr;
+    if (address && address->sa_family == AF_INET6)
+        host = &((const struct sockaddr_in6 *)(const void *)address)->sin6_addr;
     if (!host || !inet_ntop(address->sa_family, host, out, (socklen_t)size)) snprintf(out, size, "-");
 }
 
@@ -47,17 +48,21 @@ static void log_request(const lathe_request *request, struct MHD_Connection *con
     client_address(address, sizeof address, connection);
     size_t n = 0;
     for (const char *p = request->logged ? request->logged : "-"; *p && n < sizeof target - 5; p++) {
-        if (*p > ' ' && *p < 127 && *p != '"' && *p != '\\') target[n++] = *p;
-        else n += (size_t)snprintf(target + n, 5, "\\x%02x", (unsigned char)*p);
+        if (*p > ' ' && *p < 127 && *p != '"' && *p != '\\')
+            target[n++] = *p;
+        else
+            n += (size_t)snprintf(target + n, 5, "\\x%02x", (unsigned char)*p);
     }
     target[n] = 0;
-    for (n = 0; n < sizeof method - 1 && isalpha((unsigned char)request->method[n]); n++) method[n] = request->method[n];
+    for (n = 0; n < sizeof method - 1 && isalpha((unsigned char)request->method[n]); n++)
+        method[n] = request->method[n];
     method[n] = 0;
     fprintf(stderr, "%s \"%s %s\" %u %llu %lldms\n", address, n ? method : "-", target, status,
             (unsigned long long)request->bytes, (long long)(lathe__now_ms() - request->started));
 }
 
-void lathe__request_end(void *service, struct MHD_Connection *connection, void **pointer, enum MHD_RequestTerminationCode code) {
+void lathe__request_end(void *service, struct MHD_Connection *connection, void **pointer,
+                        enum MHD_RequestTerminationCode code) {
     lathe_request *request = *pointer;
     (void)code;
     if (!request) return;
@@ -71,7 +76,10 @@ void lathe__request_end(void *service, struct MHD_Connection *connection, void *
 
 /* ---- vetting ---- */
 
-typedef struct framing { unsigned hosts, lengths, encodings; bool body, bad_name; } framing;
+typedef struct framing {
+    unsigned hosts, lengths, encodings;
+    bool body, bad_name;
+} framing;
 
 /* `Transfer-Encoding : chunked` must not pass for another header. */
 static bool is_token(const char *text) {
@@ -83,18 +91,20 @@ static enum MHD_Result count_header(void *context, enum MHD_ValueKind kind, cons
     framing *f = context;
     (void)kind;
     if (!is_token(name)) f->bad_name = true;
-    if (!strcasecmp(name, "Host")) f->hosts++;
-    else if (!strcasecmp(name, "Transfer-Encoding")) f->encodings++;
+    if (!strcasecmp(name, "Host"))
+        f->hosts++;
+    else if (!strcasecmp(name, "Transfer-Encoding"))
+        f->encodings++;
     else if (!strcasecmp(name, "Content-Length")) {
         f->lengths++;
-        if (!value || strcmp(value, "0")) f->body = true;
+        if (!value || strcmp(value, "0") != 0) f->body = true;
     }
     return MHD_YES;
 }
 
-/* A NUL in the request line ends the library's strings early, so two readers of the same bytes could disagree. In 0.9.7x
- * method, target and version stand in one buffer, one blank (overwritten by zero) between; where another release keeps them
- * elsewhere, they are farther apart, and nothing is checked. */
+/* A NUL in the request line ends the library's strings early, so two readers of the same bytes could disagree. In
+ * 0.9.7x method, target and version stand in one buffer, one blank (overwritten by zero) between; where another release
+ * keeps them elsewhere, they are farther apart, and nothing is checked. */
 static bool has_gap(uintptr_t text, size_t size, uintptr_t next) {
     return next > text && next - text <= 16384 && next - text != size + 1;
 }
@@ -115,7 +125,8 @@ unsigned lathe__request_vet(lathe_request *request, const char *version, const c
     if (f.hosts > 1) return *why = "more than one Host", 400;
     if (!request->logged) return *why = "out of memory", 503;
     if (has_nul(request, version)) return *why = "a NUL or a superfluous blank in the request line", 400;
-    bool reads = !strcmp(request->method, "GET") || !strcmp(request->method, "HEAD") || !strcmp(request->method, "OPTIONS");
+    bool reads =
+        !strcmp(request->method, "GET") || !strcmp(request->method, "HEAD") || !strcmp(request->method, "OPTIONS");
     if (body && reads) return *why = "this server takes no request bodies: send the request without one", 400;
     return 0;
 }
@@ -137,7 +148,8 @@ static bool decode(char *text, bool plus_is_blank) {
             if (low < 0 || !(high | low)) return false;
             *out++ = (char)(high << 4 | low);
             p += 2;
-        } else *out++ = plus_is_blank && *p == '+' ? ' ' : *p;
+        } else
+            *out++ = plus_is_blank && *p == '+' ? ' ' : *p;
     }
     *out = 0;
     return true;
@@ -150,7 +162,8 @@ static bool cut_query(lathe_request *request, char *query, const char **why) {
         if (!*part) continue;
         char *value = strchr(part, '=');
         if (value) *value++ = 0;
-        if (!decode(part, true) || (value && !decode(value, true))) return *why = "a malformed percent escape in the query", false;
+        if (!decode(part, true) || (value && !decode(value, true)))
+            return *why = "a malformed percent escape in the query", false;
         if (request->query_count == LATHE_MAX_QUERY) return *why = "more than 16 query parameters", false;
         request->query[request->query_count].name = part;
         request->query[request->query_count++].value = value ? value : "";
@@ -180,16 +193,19 @@ unsigned lathe__request_parse(lathe_request *request, const char **why) {
     char *target = request->target;
     if (!target) return *why = "out of memory", 503;
     for (const char *p = target; *p; p++)
-        if (*p <= ' ' || *p >= 127 || *p == '#') return *why = "a character in the request target that must be escaped", 400;
+        if (*p <= ' ' || *p >= 127 || *p == '#')
+            return *why = "a character in the request target that must be escaped", 400;
     if (!strncasecmp(target, "http://", 7) || !strncasecmp(target, "https://", 8)) {
         target = strchr(target, ':') + 3;
         target += strcspn(target, "/?");
-        if (!*target) return 0;    /* the root, as no segment */
+        if (!*target) return 0; /* the root, as no segment */
     }
     char *query = strchr(target, '?');
     if (query) *query++ = 0;
-    if (!*target && request->target != target) target = NULL;
-    else if (*target != '/') return *why = "the request target must begin with a slash", 400;
+    if (!*target && request->target != target)
+        target = NULL;
+    else if (*target != '/')
+        return *why = "the request target must begin with a slash", 400;
     if (target && target[1] && !cut_path(request, target, why)) return 400;
     return query && !cut_query(request, query, why) ? 400 : 0;
 }
@@ -220,16 +236,17 @@ lathe_entry *lathe__request_entry(lathe_request *request, enum MHD_Result *resul
         return NULL;
     }
     const char *version = lathe__request_query(request, "v");
-    if (version && strcmp(version, entry->hash)) {
-        *result = lathe__respond_problem(request, 404, "this version of the model is not served: its manifest has the hash %s",
-                                         entry->hash);
+    if (version && strcmp(version, entry->hash) != 0) {
+        *result = lathe__respond_problem(
+            request, 404, "this version of the model is not served: its manifest has the hash %s", entry->hash);
         lathe__entry_release(entry);
         return NULL;
     }
     return entry;
 }
 
-bool lathe__request_structure(lathe_request *request, const lathe_entry *entry, int64_t *structure, enum MHD_Result *result) {
+bool lathe__request_structure(lathe_request *request, const lathe_entry *entry, int64_t *structure,
+                              enum MHD_Result *result) {
     const char *name = lathe__request_query(request, "structure");
     *structure = -1;
     if (!name) return true;
@@ -239,7 +256,8 @@ bool lathe__request_structure(lathe_request *request, const lathe_entry *entry, 
     }
     *structure = lathe_model_find(entry->model, name);
     if (*structure >= 0) return true;
-    *result = lathe__respond_problem(request, 404, "the model has no structure of this name: /models/%s lists its %u structures",
+    *result = lathe__respond_problem(request, 404,
+                                     "the model has no structure of this name: /models/%s lists its %u structures",
                                      entry->id, entry->info->structure_count);
     return false;
 }

@@ -9,7 +9,8 @@
 static const char METHODS[] = "GET, HEAD, OPTIONS";
 /* The page is one file: its scripts and styles are inline, its decoder is wasm run in a worker made from a blob. */
 static const char PAGE_POLICY[] =
-    "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' blob:; worker-src blob:; style-src 'unsafe-inline'; "
+    "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' blob:; worker-src blob:; style-src "
+    "'unsafe-inline'; "
     "img-src 'self' data: blob:; connect-src 'self' data: blob:; base-uri 'none'; form-action 'none'";
 
 static bool add(struct MHD_Response *response, const char *name, const char *value) {
@@ -44,8 +45,8 @@ static const char *title_of(unsigned status) {
 
 static enum MHD_Result send_problem(lathe_request *request, unsigned status, const char *extra, const char *extra_value,
                                     const char *detail) {
-    json_t *json = json_pack("{s:s, s:s, s:i, s:o}", "type", "about:blank", "title", title_of(status), "status", (int)status,
-                             "detail", lathe__json_name(detail));
+    json_t *json = json_pack("{s:s, s:s, s:i, s:o}", "type", "about:blank", "title", title_of(status), "status",
+                             (int)status, "detail", lathe__json_name(detail));
     char *text = json ? json_dumps(json, JSON_INDENT(2)) : NULL;
     json_decref(json);
     if (!text) return MHD_NO;
@@ -55,9 +56,10 @@ static enum MHD_Result send_problem(lathe_request *request, unsigned status, con
         free(text);
         return MHD_NO;
     }
-    bool fine = add(response, "Content-Type", "application/problem+json") && add(response, "Cache-Control", "no-store") &&
-                add(response, "X-Content-Type-Options", "nosniff") && add_open_access(response) &&
-                (!extra || add(response, extra, extra_value)) && (!request->close || add(response, "Connection", "close"));
+    bool fine = add(response, "Content-Type", "application/problem+json") &&
+                add(response, "Cache-Control", "no-store") && add(response, "X-Content-Type-Options", "nosniff") &&
+                add_open_access(response) && (!extra || add(response, extra, extra_value)) &&
+                (!request->close || add(response, "Connection", "close"));
     enum MHD_Result result = fine ? queue(request, status, response, size) : MHD_NO;
     MHD_destroy_response(response);
     return result;
@@ -103,9 +105,10 @@ static bool add_description(struct MHD_Response *response, const lathe_represent
     return add(response, "Content-Type", r->type) && add(response, "X-Content-Type-Options", "nosniff") &&
            (!(r->traits & LATHE_RANGES) || add(response, "Accept-Ranges", "bytes")) &&
            (!r->file_name[0] || add(response, "Content-Disposition", disposition)) &&
-           (!(r->traits & LATHE_PAGE) ||
-            (add(response, "Content-Security-Policy", PAGE_POLICY) && add(response, "Referrer-Policy", "no-referrer"))) &&
-           (r->encoding == LATHE_IDENTITY || add(response, "Content-Encoding", r->encoding == LATHE_BROTLI ? "br" : "gzip"));
+           (!(r->traits & LATHE_PAGE) || (add(response, "Content-Security-Policy", PAGE_POLICY) &&
+                                          add(response, "Referrer-Policy", "no-referrer"))) &&
+           (r->encoding == LATHE_IDENTITY ||
+            add(response, "Content-Encoding", r->encoding == LATHE_BROTLI ? "br" : "gzip"));
 }
 
 /* A response of bytes [offset, offset + size) that holds the body while it is being sent. */
@@ -142,7 +145,9 @@ static bool matches(const char *list, const char *etag) {
     return false;
 }
 
-typedef struct range { uint64_t first, count; } range;
+typedef struct range {
+    uint64_t first, count;
+} range;
 typedef enum range_kind { WHOLE, PART, UNSATISFIABLE } range_kind;
 
 static bool read_position(const char **p, uint64_t *value) {
@@ -157,7 +162,7 @@ static bool read_position(const char **p, uint64_t *value) {
 /* One range of bytes. What is malformed, of another unit, or several ranges is ignored, as RFC 9110 allows. */
 static range_kind parse_range(const char *text, uint64_t size, range *out) {
     uint64_t first = 0, last = 0;
-    if (!text || strncmp(text, "bytes=", 6)) return WHOLE;
+    if (!text || strncmp(text, "bytes=", 6) != 0) return WHOLE;
     const char *p = text + 6;
     bool has_first = read_position(&p, &first);
     if (*p++ != '-') return WHOLE;
@@ -175,16 +180,16 @@ static range_kind parse_range(const char *text, uint64_t size, range *out) {
 }
 
 static range_kind wanted_range(const lathe_request *request, const lathe_representation *r, range *out) {
-    if (!(r->traits & LATHE_RANGES) || strcmp(request->method, "GET")) return WHOLE;
+    if (!(r->traits & LATHE_RANGES) || strcmp(request->method, "GET") != 0) return WHOLE;
     const char *condition = lathe__request_header(request, "If-Range");
-    if (condition && strcmp(condition, r->etag)) return WHOLE;
+    if (condition && strcmp(condition, r->etag) != 0) return WHOLE;
     return parse_range(lathe__request_header(request, "Range"), r->body->size, out);
 }
 
 static enum MHD_Result send_part(lathe_request *request, lathe_representation *r, range part, bool versioned) {
     char content_range[80];
-    snprintf(content_range, sizeof content_range, "bytes %" PRIu64 "-%" PRIu64 "/%zu", part.first, part.first + part.count - 1,
-             r->body->size);
+    snprintf(content_range, sizeof content_range, "bytes %" PRIu64 "-%" PRIu64 "/%zu", part.first,
+             part.first + part.count - 1, r->body->size);
     struct MHD_Response *response = body_response(r->body, (size_t)part.first, (size_t)part.count);
     if (!response) return MHD_NO;
     bool fine = add_validators(response, r, versioned) && add_description(response, r) &&
@@ -195,7 +200,8 @@ static enum MHD_Result send_part(lathe_request *request, lathe_representation *r
 }
 
 static enum MHD_Result send_representation(lathe_request *request, lathe_representation *r) {
-    bool versioned = r->entry && lathe__request_query(request, "v");
+    /* Pages and JSON also change with the program, so only the model's own bytes are kept for ever. */
+    bool versioned = (r->traits & LATHE_RANGES) && lathe__request_query(request, "v");
     const char *known = lathe__request_header(request, "If-None-Match");
     if (known && matches(known, r->etag)) return queue(request, 304, r->unchanged[versioned], 0);
     range part = {0};
@@ -216,14 +222,16 @@ enum MHD_Result lathe__respond(lathe_request *request, const lathe_recipe *recip
     bool compressible = (recipe->traits & LATHE_COMPRESSIBLE) != 0;
     lathe_encoding encoding = lathe__negotiate(lathe__request_header(request, "Accept-Encoding"), compressible);
     if (encoding == LATHE_NONE_ACCEPTABLE)
-        return lathe__respond_problem(request, 406, compressible ? "Accept-Encoding excludes br, gzip and identity: allow one"
-                                                                 : "Accept-Encoding excludes identity, and this is sent as it is");
+        return lathe__respond_problem(request, 406,
+                                      compressible ? "Accept-Encoding excludes br, gzip and identity: allow one"
+                                                   : "Accept-Encoding excludes identity, and this is sent as it is");
     lathe_representation *r;
     lathe_error err = {""};
     lathe_status status = lathe__cache_get(&r, request->service->cache, recipe, encoding, &err);
     if (status)
-        return lathe__respond_problem(request, status == LATHE_ERR_MEMORY ? 503 : 500, "this could not be built: %s%s%s",
-                                      lathe_status_name(status), err.text[0] ? ": " : "", err.text);
+        return lathe__respond_problem(request, status == LATHE_ERR_MEMORY ? 503 : 500,
+                                      "this could not be built: %s%s%s", lathe_status_name(status),
+                                      err.text[0] ? ": " : "", err.text);
     enum MHD_Result result = send_representation(request, r);
     lathe__cache_release(request->service->cache, r);
     return result;

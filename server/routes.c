@@ -1,9 +1,12 @@
-/* The route table. A star matches one segment, or with a suffix one segment that ends in it; matches are captured in order.
- * The first pattern that fits wins. */
+/* The route table. A star matches one segment, or with a suffix one segment that ends in it; matches are captured in
+ * order. The first pattern that fits wins. */
 #include "service.h"
 #include <string.h>
 
-typedef struct route { const char *segments[5]; lathe_handler handle; } route;
+typedef struct route {
+    const char *segments[5];
+    lathe_handler handle;
+} route;
 static const route ROUTES[] = {
     {{0}, lathe__handle_index},
     {{"m", "*"}, lathe__handle_page},
@@ -48,8 +51,8 @@ static const route *find_route(lathe_request *request) {
     return NULL;
 }
 
-/* What is wrong with the request as a message is answered before its body is read: the library then closes the connection,
- * so that nothing that follows can be taken for a request. */
+/* What is wrong with the request as a message is answered before its body is read: the library then closes the
+ * connection, so that nothing that follows can be taken for a request. */
 static enum MHD_Result begin(lathe_request *request, const char *version) {
     const char *why = "";
     unsigned status = lathe__request_vet(request, version, &why);
@@ -68,14 +71,17 @@ static enum MHD_Result answer(lathe_request *request) {
     unsigned status = lathe__request_parse(request, &why);
     if (status) return lathe__respond_problem(request, status, "%s", why);
     const route *route = find_route(request);
-    if (!route) return lathe__respond_problem(request, 404, "there is nothing at this address: docs/HTTP_API.md has the routes");
+    if (!route)
+        return lathe__respond_problem(request, 404,
+                                      "there is nothing at this address: docs/HTTP_API.md has the routes");
     if (options) return lathe__respond_options(request);
-    if (strcmp(request->method, "GET") && strcmp(request->method, "HEAD")) return lathe__respond_not_allowed(request);
+    if (strcmp(request->method, "GET") != 0 && strcmp(request->method, "HEAD") != 0)
+        return lathe__respond_not_allowed(request);
     return route->handle(request);
 }
 
-/* The library calls this when the headers are in, and again when the body, which is empty, has been read: only a reply queued
- * then leaves the connection open for the next request. */
+/* The library calls this when the headers are in, and again when the body, which is empty, has been read: only a reply
+ * queued then leaves the connection open for the next request. */
 enum MHD_Result lathe__route(void *service, struct MHD_Connection *connection, const char *url, const char *method,
                              const char *version, const char *upload, size_t *upload_size, void **pointer) {
     lathe_request *request = *pointer;

@@ -41,8 +41,8 @@ static void complete_options(lathe_serve_options *o) {
     o->header_seconds = choose(o->header_seconds, "LATHE_HEADER_SECONDS", 10, 3600);
     o->idle_seconds = choose(o->idle_seconds, "LATHE_IDLE_SECONDS", 30, 3600);
     o->drain_seconds = choose(o->drain_seconds, "LATHE_DRAIN_SECONDS", 10, 3600);
-    o->cache_megabytes = choose((unsigned)(o->cache_megabytes < UINT_MAX ? o->cache_megabytes : UINT_MAX), "LATHE_CACHE_MB", 256,
-                                1u << 20);
+    o->cache_megabytes = choose((unsigned)(o->cache_megabytes < UINT_MAX ? o->cache_megabytes : UINT_MAX),
+                                "LATHE_CACHE_MB", 256, 1u << 20);
     if (o->max_connections < o->threads) o->max_connections = o->threads;
 }
 
@@ -85,16 +85,18 @@ static int open_socket(const lathe_serve_options *options) {
     if (error == EADDRINUSE)
         fprintf(stderr, "lathe: port %u on %s is in use by another program: stop it or choose another with --port\n",
                 options->port, options->bind);
-    else fprintf(stderr, "lathe: cannot listen on port %u of %s: %s\n", options->port, options->bind, strerror(error));
+    else
+        fprintf(stderr, "lathe: cannot listen on port %u of %s: %s\n", options->port, options->bind, strerror(error));
     return -1;
 }
 
 static void announce(int fd) {
-    struct sockaddr_storage address;
+    struct sockaddr_storage address = {0};
     socklen_t size = sizeof address;
     char host[NI_MAXHOST] = "?", port[NI_MAXSERV] = "?";
     if (!getsockname(fd, (struct sockaddr *)&address, &size))
-        getnameinfo((struct sockaddr *)&address, size, host, sizeof host, port, sizeof port, NI_NUMERICHOST | NI_NUMERICSERV);
+        getnameinfo((struct sockaddr *)&address, size, host, sizeof host, port, sizeof port,
+                    NI_NUMERICHOST | NI_NUMERICSERV);
     bool six = address.ss_family == AF_INET6;
     printf("listening on http://%s%s%s:%s\n", six ? "[" : "", host, six ? "]" : "", port);
     fflush(stdout);
@@ -116,8 +118,8 @@ static struct MHD_Daemon *start_daemon(lathe_service *service, int fd) {
     return MHD_start_daemon(flags, 0, NULL, NULL, lathe__route, service, MHD_OPTION_LISTEN_SOCKET, fd, MHD_OPTION_ARRAY,
                             service->options.threads > 1 ? threads : threads + 1, MHD_OPTION_CONNECTION_LIMIT,
                             service->options.max_connections, MHD_OPTION_CONNECTION_MEMORY_LIMIT, (size_t)MEMORY_LIMIT,
-                            MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)INACTIVITY_SECONDS, MHD_OPTION_STRICT_FOR_CLIENT, 1,
-                            MHD_OPTION_UNESCAPE_CALLBACK, leave_escaped, NULL, MHD_OPTION_URI_LOG_CALLBACK,
+                            MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)INACTIVITY_SECONDS, MHD_OPTION_STRICT_FOR_CLIENT,
+                            1, MHD_OPTION_UNESCAPE_CALLBACK, leave_escaped, NULL, MHD_OPTION_URI_LOG_CALLBACK,
                             lathe__request_begin, service, MHD_OPTION_NOTIFY_COMPLETED, lathe__request_end, service,
                             MHD_OPTION_NOTIFY_CONNECTION, lathe__peer_event, service, MHD_OPTION_END);
 }
@@ -142,13 +144,14 @@ static void run(lathe_service *service, const sigset_t *signals) {
 /* No new connections; requests under way, and those that arrive within a moment, are answered; then the rest is cut. */
 static void drain(lathe_service *service, struct MHD_Daemon *daemon, const sigset_t *signals) {
     int fd = MHD_quiesce_daemon(daemon);
-    if (fd >= 0) close(fd);
+    if (fd >= 0) shutdown(fd, SHUT_RDWR); /* refuses connections; closed later, since threads may still name it */
     int64_t started = lathe__now_ms(), end = started + (int64_t)service->options.drain_seconds * 1000;
     atomic_store(&service->draining, true);
     while (lathe__peers_reap(service, lathe__now_ms() - started > GRACE_MS, false) && lathe__now_ms() < end)
         if (wait_signal(signals, 20)) break;
     lathe__peers_reap(service, false, true);
     MHD_stop_daemon(daemon);
+    if (fd >= 0) close(fd);
 }
 
 static int serve(lathe_service *service, const sigset_t *signals) {

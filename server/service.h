@@ -45,8 +45,8 @@ lathe_entry *lathe__store_find(lathe_store *store, const char *id);          /* 
 lathe_entry **lathe__store_list(lathe_store *store, size_t *count, uint64_t *generation);
 lathe_entry *lathe__entry_retain(lathe_entry *entry);
 void lathe__entry_release(lathe_entry *entry);
-/* The box of level 0; false if it cannot be built. */
-bool lathe__entry_bounds(lathe_entry *entry, double low[3], double high[3]);
+/* The box of level 0 of one structure, or of all (-1, remembered); false if it cannot be built. */
+bool lathe__entry_bounds(lathe_entry *entry, int64_t structure, double low[3], double high[3]);
 
 /* ---- representation.c: what has been built, in memory up to a limit ---- */
 typedef enum lathe_encoding { LATHE_IDENTITY, LATHE_GZIP, LATHE_BROTLI, LATHE_NONE_ACCEPTABLE } lathe_encoding;

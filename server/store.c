@@ -9,18 +9,28 @@
 #include <string.h>
 
 /* A file that was refused is remembered, so that it is reported once and not each time we look. */
-typedef struct refused { char *path; struct stat stat; struct refused *next; } refused;
+typedef struct refused {
+    char *path;
+    struct stat stat;
+    struct refused *next;
+} refused;
 struct lathe_store {
-    pthread_mutex_t lock;          /* of entries, count, generation */
-    lathe_entry **entries;         /* sorted by id */
+    pthread_mutex_t lock;  /* of entries, count, generation */
+    lathe_entry **entries; /* sorted by id */
     size_t count;
     uint64_t generation;
-    char **paths;                  /* as given */
+    char **paths; /* as given */
     size_t path_count;
     refused *refused;
 };
-typedef struct found { char *path; char id[LATHE_ID_SIZE]; } found;
-typedef struct finds { found *items; size_t count, capacity; } finds;
+typedef struct found {
+    char *path;
+    char id[LATHE_ID_SIZE];
+} found;
+typedef struct finds {
+    found *items;
+    size_t count, capacity;
+} finds;
 
 lathe_entry *lathe__entry_retain(lathe_entry *entry) {
     atomic_fetch_add(&entry->references, 1);
@@ -56,7 +66,11 @@ static void id_of_path(char id[LATHE_ID_SIZE], const char *path) {
     id[size] = 0;
 }
 
-static int by_id(const void *a, const void *b) { return strcmp(((const found *)a)->id, ((const found *)b)->id); }
+static int by_id(const void *a, const void *b) {
+    const found *x = a, *y = b;
+    int order = strcmp(x->id, y->id);
+    return order ? order : strcmp(x->path, y->path);
+}
 
 static bool add_find(finds *list, const char *directory, const char *name) {
     if (list->count == list->capacity) {
@@ -81,18 +95,21 @@ static void add_directory(finds *list, const char *path) {
     for (struct dirent *at; (at = readdir(directory));) {
         size_t size = strlen(at->d_name);
         /* Names with a dot in front are files being written. */
-        if (at->d_name[0] != '.' && size > 6 && !strcmp(at->d_name + size - 6, ".lathe")) add_find(list, path, at->d_name);
+        if (at->d_name[0] != '.' && size > 6 && !strcmp(at->d_name + size - 6, ".lathe"))
+            add_find(list, path, at->d_name);
     }
     closedir(directory);
 }
 
 static finds find_all(const lathe_store *store) {
     finds list = {0};
-    for (size_t i = 0; i < store->path_count; i++) {
+    for (size_t i = 0; store->paths && i < store->path_count; i++) {
         struct stat stat_;
-        if (stat(store->paths[i], &stat_)) continue;
-        if (S_ISDIR(stat_.st_mode)) add_directory(&list, store->paths[i]);
-        else add_find(&list, NULL, store->paths[i]);
+        if (!store->paths[i] || stat(store->paths[i], &stat_)) continue;
+        if (S_ISDIR(stat_.st_mode))
+            add_directory(&list, store->paths[i]);
+        else
+            add_find(&list, NULL, store->paths[i]);
     }
     if (list.count) qsort(list.items, list.count, sizeof *list.items, by_id);
     return list;
@@ -108,11 +125,13 @@ static lathe_status open_entry(lathe_entry **out, const found *file, const struc
     entry->path = strdup(file->path);
     lathe_status status = entry->path ? lathe_model_open(&entry->model, file->path, err) : LATHE_ERR_MEMORY;
     if (!status) status = lathe_model_check(entry->model, err);
+    if (!status) entry->info = lathe_model_describe(entry->model);
+    if (!status && (!entry->info->structure_count || !entry->info->level_count))
+        status = lathe_fail(err, LATHE_ERR_FORMAT, "it has no structure or no level");
     if (status) {
         lathe__entry_release(entry);
         return status;
     }
-    entry->info = lathe_model_describe(entry->model);
     size_t size;
     const uint8_t *bytes = lathe_model_bytes(entry->model, &size);
     lathe__hash(entry->hash, bytes, size);
@@ -134,7 +153,8 @@ static bool refuse(lathe_store *store, const char *path, const struct stat *stat
         r->stat = *stat_;
         r->next = store->refused;
         store->refused = r;
-    } else free(r);
+    } else
+        free(r);
     return true;
 }
 
@@ -157,18 +177,20 @@ static lathe_entry *entry_of(lathe_store *store, const found *file) {
     lathe_error err = {""};
     lathe_status status = open_entry(&entry, file, &stat_, &err);
     if (status && refuse(store, file->path, &stat_))
-        fprintf(stderr, "lathe: %s is not served: %s%s%s\n", file->path, lathe_status_name(status), err.text[0] ? ": " : "", err.text);
+        fprintf(stderr, "lathe: %s is not served: %s%s%s\n", file->path, lathe_status_name(status),
+                err.text[0] ? ": " : "", err.text);
     return entry;
 }
 
 static lathe_entry **load_all(lathe_store *store, const finds *files, size_t *count) {
-    lathe_entry **entries = calloc(files->count + 1, sizeof *entries);
+    lathe_entry **entries = calloc(files->count + 1, sizeof(lathe_entry *));
     *count = 0;
     for (size_t i = 0; entries && i < files->count; i++) {
         bool taken = *count && !strcmp(entries[*count - 1]->id, files->items[i].id);
         struct stat stat_;
         if (taken && !stat(files->items[i].path, &stat_)) {
-            if (strcmp(entries[*count - 1]->path, files->items[i].path) && refuse(store, files->items[i].path, &stat_))
+            if (strcmp(entries[*count - 1]->path, files->items[i].path) != 0 &&
+                refuse(store, files->items[i].path, &stat_))
                 fprintf(stderr, "lathe: %s is not served: %s has the same id `%s`\n", files->items[i].path,
                         entries[*count - 1]->path, files->items[i].id);
             continue;
@@ -233,7 +255,7 @@ lathe_status lathe__store_open(lathe_store **out, const char *const *paths, size
 void lathe__store_close(lathe_store **store) {
     if (!*store) return;
     for (size_t i = 0; i < (*store)->count; i++) lathe__entry_release((*store)->entries[i]);
-    for (size_t i = 0; i < (*store)->path_count; i++) free((*store)->paths[i]);
+    for (size_t i = 0; (*store)->paths && i < (*store)->path_count; i++) free((*store)->paths[i]);
     for (refused *r = (*store)->refused, *next; r; r = next) {
         next = r->next;
         free(r->path);
@@ -256,8 +278,10 @@ lathe_entry *lathe__store_find(lathe_store *store, const char *id) {
             entry = lathe__entry_retain(store->entries[middle]);
             break;
         }
-        if (order < 0) high = middle;
-        else low = middle + 1;
+        if (order < 0)
+            high = middle;
+        else
+            low = middle + 1;
     }
     pthread_mutex_unlock(&store->lock);
     return entry;
@@ -265,7 +289,7 @@ lathe_entry *lathe__store_find(lathe_store *store, const char *id) {
 
 lathe_entry **lathe__store_list(lathe_store *store, size_t *count, uint64_t *generation) {
     pthread_mutex_lock(&store->lock);
-    lathe_entry **list = calloc(store->count + 1, sizeof *list);
+    lathe_entry **list = calloc(store->count + 1, sizeof(lathe_entry *));
     *count = list ? store->count : 0;
     *generation = store->generation;
     for (size_t i = 0; i < *count; i++) list[i] = lathe__entry_retain(store->entries[i]);
@@ -273,22 +297,23 @@ lathe_entry **lathe__store_list(lathe_store *store, size_t *count, uint64_t *gen
     return list;
 }
 
-static bool measure_bounds(lathe_entry *entry) {
+static bool measure_bounds(const lathe_entry *entry, int64_t structure, double low[3], double high[3]) {
     lathe_world_mesh mesh = {0};
-    if (lathe_model_mesh(&mesh, entry->model, -1, 0, NULL)) return false;
-    for (int axis = 0; axis < 3; axis++) entry->low[axis] = INFINITY, entry->high[axis] = -INFINITY;
+    if (lathe_model_mesh(&mesh, entry->model, structure, 0, NULL)) return false;
+    for (int axis = 0; axis < 3; axis++) low[axis] = INFINITY, high[axis] = -INFINITY;
     for (size_t i = 0; i < 3 * (size_t)mesh.vertex_count; i++) {
         double at = mesh.positions[i];
-        if (at < entry->low[i % 3]) entry->low[i % 3] = at;
-        if (at > entry->high[i % 3]) entry->high[i % 3] = at;
+        if (at < low[i % 3]) low[i % 3] = at;
+        if (at > high[i % 3]) high[i % 3] = at;
     }
     lathe_world_mesh_free(&mesh);
-    return entry->low[0] <= entry->high[0];
+    return low[0] <= high[0];
 }
 
-bool lathe__entry_bounds(lathe_entry *entry, double low[3], double high[3]) {
+bool lathe__entry_bounds(lathe_entry *entry, int64_t structure, double low[3], double high[3]) {
+    if (structure >= 0) return measure_bounds(entry, structure, low, high);
     pthread_mutex_lock(&entry->bounds_lock);
-    if (!entry->bounds_state) entry->bounds_state = measure_bounds(entry) ? 1 : -1;
+    if (!entry->bounds_state) entry->bounds_state = measure_bounds(entry, -1, entry->low, entry->high) ? 1 : -1;
     bool known = entry->bounds_state > 0;
     pthread_mutex_unlock(&entry->bounds_lock);
     for (int axis = 0; axis < 3; axis++) low[axis] = entry->low[axis], high[axis] = entry->high[axis];

@@ -94,13 +94,30 @@ tests_sanitize() {
     # shellcheck disable=SC2086
     [ -n "$list" ] && run_many "-sanitize" 600 $list
     if [ -x build/sanitize/lathe ] && [ -f tests/test_cli.sh ]; then
-        LATHE_BIN=$PWD/build/sanitize/lathe run test_cli.sh-sanitize 600 bash tests/test_cli.sh
+        LATHE_BIN=$PWD/build/sanitize/lathe LATHE_PHANTOM=$PWD/build/sanitize/tests/make_phantom run test_cli.sh-sanitize 600 bash tests/test_cli.sh
     fi
+}
+
+seed_archives() {                           # small archives, and their streams behind the byte that fuzz_delta takes first
+    local kind size footer
+    mkdir -p build/corpus/fuzz_archive build/corpus/fuzz_delta
+    [ -x "$LATHE_BIN" ] && [ -x "$LATHE_PHANTOM" ] || return
+    for kind in ball labels values; do
+        "$LATHE_PHANTOM" $kind build/corpus/$kind.json 14
+        local options="--iso 100"
+        [ $kind = labels ] && options="--labels all"
+        # shellcheck disable=SC2086
+        "$LATHE_BIN" bake build/corpus/$kind.json $options --quiet -o build/corpus/fuzz_archive/$kind
+        size=$(stat -c %s build/corpus/fuzz_archive/$kind)
+        footer=$(od -An -tu8 -j $((size - 16)) -N 8 build/corpus/fuzz_archive/$kind | tr -d ' ')
+        { printf '\0'; head -c "$footer" build/corpus/fuzz_archive/$kind; } >build/corpus/fuzz_delta/$kind
+    done
 }
 
 tests_fuzz() {
     local source name seconds=${SECONDS_EACH:-10}
     build build-fuzz config=fuzz fuzzers
+    seed_archives
     for source in tests/fuzz_*.c; do
         name=$(basename "$source" .c)
         [ -x "build/fuzz/tests/$name" ] || continue
