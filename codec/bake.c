@@ -20,6 +20,7 @@ typedef struct bake {
     lathe_header header;
     lathe_baked_structure *baked;
     lathe_arena arena[2];
+    lathe_occupancy *trained;
     double done, total;        /* voxels, for progress */
     lathe_error *err;
 } bake;
@@ -159,7 +160,7 @@ static lathe_status bake_structure(bake *b, size_t index) {
     if (!status) {
         state.fraction = mean_fraction(b, &state.mask);
         if (!b->options->structure_count) b->header.parameters[0] = (uint32_t)state.fraction;
-        status = lathe__structure_encode(baked, &state, b->arena);
+        status = lathe__structure_encode(baked, &state, b->arena, &b->trained);
         if (status) lathe_fail(b->err, status, "%s: encoding: %s", h->name, lathe_status_name(status));
     }
     if (!status) {
@@ -271,6 +272,7 @@ lathe_status lathe_bake(const lathe_volume *volume, const lathe_bake_options *op
     free(b.baked);
     free(b.header.structures);
     free(b.boxes);
+    lathe__occupancy_free(&b.trained);
     lathe__arena_free(&b.arena[0]);
     lathe__arena_free(&b.arena[1]);
     return status;

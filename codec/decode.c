@@ -13,6 +13,7 @@ struct lathe_decoder {
     uint32_t next_packet;      /* of the current level record */
     uint32_t next_structure;
     lathe_structure_state *states;
+    lathe_occupancy *trained;  /* what every structure's coder starts from */
     lathe_transform *transforms;
     lathe_arena arena[2];
     lathe_mesh mesh;           /* of mesh_of at its level, if mesh_level >= 0 */
@@ -38,6 +39,7 @@ void lathe_decoder_close(lathe_decoder **decoder) {
     if (!decoder || !*decoder) return;
     lathe_decoder *d = *decoder;
     for (uint32_t i = 0; d->states && i < d->header.structure_count; i++) lathe__state_free(&d->states[i]);
+    lathe__occupancy_free(&d->trained);
     free(d->states);
     free(d->transforms);
     free(d->bytes);
@@ -138,7 +140,7 @@ lathe_status lathe_decoder_step(lathe_decoder *d, lathe_step *step) {
     uint32_t s = d->next_structure++;
     lathe_structure_state *state = &d->states[s];
     const char *fault = "";
-    status = lathe__structure_decode(state, &d->arena[0], d->head.level, payload, size, &fault);
+    status = lathe__structure_decode(state, &d->arena[0], &d->trained, d->head.level, payload, size, &fault);
     lathe__arena_reset(&d->arena[0]);
     if (status) return fail(d, status, fault);
     d->mesh_level = -1;

@@ -26,12 +26,12 @@ static lathe_status decode_base(lathe_structure_state *state, lathe_reader *read
     return lathe__base_decode(state->base, count, &state->arena, &d, &state->mask);
 }
 
-static lathe_status decode_slices(lathe_structure_state *state, lathe_arena *scratch, uint32_t level, const uint8_t *payload,
-                                  size_t size, const char **fault) {
+static lathe_status decode_slices(lathe_structure_state *state, lathe_arena *scratch, lathe_occupancy **trained, uint32_t level,
+                                  const uint8_t *payload, size_t size, const char **fault) {
     if (level == 1) {
         lathe_mask frame = state->mask;
         lathe_status status = lathe__mask_new(&state->mask, frame.size, frame.origin);
-        if (!status) status = lathe__occupancy_new(&state->occupancy, frame.size[0], frame.size[1]);
+        if (!status) status = lathe__state_start_occupancy(state, trained);
         if (status) return status;
         lathe__arena_free(&state->arena);
         state->base = NULL;
@@ -53,8 +53,8 @@ static lathe_status decode_slices(lathe_structure_state *state, lathe_arena *scr
     return status;
 }
 
-lathe_status lathe__structure_decode(lathe_structure_state *state, lathe_arena *scratch, uint32_t level, const uint8_t *payload,
-                                     size_t size, const char **fault) {
+lathe_status lathe__structure_decode(lathe_structure_state *state, lathe_arena *scratch, lathe_occupancy **trained, uint32_t level,
+                                     const uint8_t *payload, size_t size, const char **fault) {
     *fault = "levels out of order";
     if (state->level + 1 != (int32_t)level || level >= state->plan.level_count) return LATHE_ERR_FORMAT;
     lathe_status status;
@@ -63,7 +63,7 @@ lathe_status lathe__structure_decode(lathe_structure_state *state, lathe_arena *
         status = decode_base(state, &reader, fault);
     } else {
         *fault = "occupancy";
-        status = decode_slices(state, scratch, level, payload, size, fault);
+        status = decode_slices(state, scratch, trained, level, payload, size, fault);
     }
     if (!status) state->level = (int32_t)level;
     return status;

@@ -91,13 +91,14 @@ static lathe_status encode_slices(lathe_bytes *out, lathe_structure_state *state
     return status ? status : appended;
 }
 
-lathe_status lathe__structure_encode(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2]) {
+lathe_status lathe__structure_encode(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2],
+                                     lathe_occupancy **trained) {
     state->plan.slices = state->mask.size[2];
     state->plan.level_count = lathe__choose_levels(state->plan.slices);
     out->level_count = state->plan.level_count;
     lathe_status status = keep_slices(state);
     if (!status) status = encode_base(&out->packets[0], state, &arena[0]);
-    if (!status) status = lathe__occupancy_new(&state->occupancy, state->mask.size[0], state->mask.size[1]);
+    if (!status) status = lathe__state_start_occupancy(state, trained);
     for (uint32_t level = 1; !status && level < out->level_count; level++)
         status = encode_slices(&out->packets[level], state, &arena[0], level);
     return status;

@@ -13,5 +13,6 @@ typedef struct lathe_baked_structure {
 void lathe__baked_free(lathe_baked_structure *baked);
 
 /* Takes a state whose mask is the whole structure; chooses its plan. Fills packets. */
-lathe_status lathe__structure_encode(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2]);
+lathe_status lathe__structure_encode(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2],
+                                     lathe_occupancy **trained);
 #endif

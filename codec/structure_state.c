@@ -9,6 +9,11 @@ void lathe__state_free(lathe_structure_state *state) {
     lathe__occupancy_free(&state->occupancy);
 }
 
+lathe_status lathe__state_start_occupancy(lathe_structure_state *state, lathe_occupancy **trained) {
+    lathe_status status = *trained ? LATHE_OK : lathe__occupancy_new(trained, 3, 3);
+    return status ? status : lathe__occupancy_copy(&state->occupancy, *trained, state->mask.size[0], state->mask.size[1]);
+}
+
 static bool contains(const int32_t *list, uint32_t count, int32_t w) {
     uint32_t low = 0, high = count;
     while (low < high) {

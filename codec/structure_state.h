@@ -27,7 +27,10 @@ lathe_status lathe__new_slices(lathe_new_slice **out, uint32_t *count, lathe_are
 lathe_status lathe__state_mesh(lathe_mesh *out, lathe_arena arena[2], const lathe_structure_state *state,
                                lathe_surface_counts *counts, uint32_t *shown);
 
+/* A fresh occupancy state for the structure; *trained is made on first use, so that training is done once for all structures. */
+lathe_status lathe__state_start_occupancy(lathe_structure_state *state, lathe_occupancy **trained);
+
 /* structure_decode.c: one packet: the state moves to `level` (its level + 1). */
-lathe_status lathe__structure_decode(lathe_structure_state *state, lathe_arena *scratch, uint32_t level, const uint8_t *payload,
-                                     size_t size, const char **fault);
+lathe_status lathe__structure_decode(lathe_structure_state *state, lathe_arena *scratch, lathe_occupancy **trained, uint32_t level,
+                                     const uint8_t *payload, size_t size, const char **fault);
 #endif

@@ -1,5 +1,6 @@
 /* /models/{m}/levels/{n}.{drc,glb,stl,ply}: a whole level as a mesh. */
 #include "service.h"
+#include <ctype.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -60,6 +61,16 @@ static bool parse_name(const char *name, uint32_t *number, int *kind) {
     return *kind < FORMAT_COUNT && lathe__parse_number(digits, number);
 }
 
+/* aal-Thalamus_L-3.glb: what needs no quoting anywhere. */
+static void name_file(lathe_recipe *recipe, const level *l) {
+    const char *id = l->entry->id, *suffix = FORMATS[l->format].suffix;
+    char structure[34] = "";
+    if (l->structure >= 0) snprintf(structure, sizeof structure, "-%s", l->entry->info->structures[l->structure].name);
+    for (char *p = structure; *p; p++)
+        if (!isalnum((unsigned char)*p) && *p != '_') *p = '-';
+    snprintf(recipe->file_name, sizeof recipe->file_name, "%s%s-%u.%s", id, structure, l->level, suffix);
+}
+
 static enum MHD_Result reply(lathe_request *request, level *l) {
     uint32_t last = lathe__entry_levels(l->entry, -1) - 1;
     if (l->level > last) return lathe__respond_problem(request, 404, "the model has levels 0..%u", last);
@@ -70,7 +81,7 @@ static enum MHD_Result reply(lathe_request *request, level *l) {
         .type = FORMATS[l->format].type, .traits = LATHE_RANGES, .entry = l->entry, .build = build_level, .context = l};
     snprintf(recipe.key, sizeof recipe.key, "%s:%s:level:%lld:%u:%d", l->entry->id, l->entry->hash,
              (long long)l->structure, l->level, l->format);
-    snprintf(recipe.file_name, sizeof recipe.file_name, "%s-%u.%s", l->entry->id, l->level, FORMATS[l->format].suffix);
+    name_file(&recipe, l);
     return lathe__respond(request, &recipe);
 }
 
