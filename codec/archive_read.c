@@ -224,27 +224,23 @@ static lathe_status stream_structure(const lathe_model *model, uint32_t structur
 
 /* ---- what describe tells ---- */
 
-/* sizes in a single pass over each level: find_packet for each of 65535 structures would take quadratic time. */
-static lathe_status fill_polar_bytes(lathe_model *model) {
-    lathe_bytes front = {0};
+/* Summed over the structures of a level these are the bytes of its part of the stream: packets count where they belong, what all
+ * share (header, head of the level record) is divided evenly. */
+static void fill_polar_bytes(lathe_model *model) {
     for (uint32_t level = 0; level < model->header.level_count; level++) {
-        uint32_t packet = 0;
-        for (uint32_t i = 0; i < model->header.structure_count; i++) {
+        const lathe_level_head *head = &model->records[level].head;
+        uint64_t common = model->totals[level].polar_bytes;
+        for (uint32_t packet = 0; packet < head->count; packet++) common -= (uint64_t)head->sizes[packet] + LATHE_CRC_SIZE;
+        for (uint32_t i = 0, packet = 0; i < model->header.structure_count; i++) {
             if (model->header.structures[i].level_count <= level) continue;
-            uint32_t size = model->records[level].head.sizes[packet++];
-            front.size = 0;
-            if (level == 0) lathe__emit_header(&front, &model->header, i, 1);
-            emit_structure_head(&front, model, i, level, size);
             lathe_level_info *info = model->levels + (model->structures[i].levels - model->levels) + level;
-            info->polar_bytes = front.size + (uint64_t)size + LATHE_CRC_SIZE;
+            info->polar_bytes = (uint64_t)head->sizes[packet] + LATHE_CRC_SIZE + common / head->count + (packet < common % head->count);
+            packet++;
         }
     }
-    lathe_status status = front.failed ? LATHE_ERR_MEMORY : LATHE_OK;
-    lathe__bytes_free(&front);
-    return status;
 }
 
-static lathe_status fill_info(lathe_model *model, lathe_error *err) {
+static void fill_info(lathe_model *model) {
     for (uint32_t i = 0; i < model->header.structure_count; i++) {
         const lathe_header_structure *from = &model->header.structures[i];
         lathe_structure_info *to = &model->structures[i];
@@ -260,7 +256,7 @@ static lathe_status fill_info(lathe_model *model, lathe_error *err) {
     model->info.axis = model->header.axis;
     model->info.boundary = model->header.boundary;
     model->info.levels = model->totals;
-    return fill_polar_bytes(model) ? lathe_fail(err, LATHE_ERR_MEMORY, "out of memory") : LATHE_OK;
+    fill_polar_bytes(model);
 }
 
 /* ---- open, close ---- */
@@ -279,7 +275,7 @@ static lathe_status read_archive(lathe_model *model, lathe_error *err) {
     status = read_header(model, &reader, err);
     if (!status) status = read_records(model, &reader, err);
     if (!status) status = read_footer(model, err);
-    if (!status) status = fill_info(model, err);
+    if (!status) fill_info(model);
     return status;
 }
 
@@ -376,20 +372,6 @@ void lathe_model_stream_range(const lathe_model *model, uint32_t from, uint32_t 
     *size = from > to ? 0 : model->records[to].end - *offset;
 }
 
-uint64_t lathe_model_stream_size(const lathe_model *model, int64_t structure, uint32_t from, uint32_t to) {
-    size_t offset, bytes;
-    if (structure < 0) {
-        lathe_model_stream_range(model, from, to, &offset, &bytes);
-        return bytes;
-    }
-    if (structure >= model->header.structure_count) return 0;
-    const lathe_structure_info *info = &model->structures[structure];
-    uint64_t sum = 0;
-    for (uint32_t level = from; level <= to && level < info->level_count; level++)
-        sum += info->levels[level].polar_bytes;
-    return sum;
-}
-
 lathe_status lathe_model_stream(const lathe_model *model, int64_t structure, uint32_t from, uint32_t to,
                                 lathe_sink sink, void *context) {
     if (structure >= model->header.structure_count) return LATHE_ERR_RANGE;
@@ -397,6 +379,17 @@ lathe_status lathe_model_stream(const lathe_model *model, int64_t structure, uin
     size_t offset, size;
     lathe_model_stream_range(model, from, to, &offset, &size);
     return size && sink(context, model->bytes + offset, size) ? LATHE_ERR_IO : LATHE_OK;
+}
+
+static int count_bytes(void *context, const void *bytes, size_t size) {
+    (void)bytes;
+    *(uint64_t *)context += size;
+    return 0;
+}
+
+uint64_t lathe_model_stream_size(const lathe_model *model, int64_t structure, uint32_t from, uint32_t to) {
+    uint64_t sum = 0;
+    return lathe_model_stream(model, structure, from, to, count_bytes, &sum) ? 0 : sum;
 }
 
 static lathe_status check_level(const lathe_model *model, uint32_t level, lathe_error *err) {

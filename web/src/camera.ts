@@ -25,7 +25,7 @@ export class Camera {
     reset() {
         this.look(2.5, 0.32);
         this.target = [...this.#centre];
-        this.distance = (0.92 * this.#radius) / LENS / Math.min(1, this.aspect);
+        this.distance = (0.78 * this.#radius) / LENS / Math.min(1, this.aspect);
     }
 
     look(turn: number, tilt: number) {

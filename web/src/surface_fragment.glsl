@@ -7,13 +7,13 @@ in float open;
 out vec4 pixel;
 void main() {
     vec3 n = normalize(gl_FrontFacing ? normal : -normal);
-    float cavity = mix(.3, 1., open);
+    float cavity = mix(.12, 1., open);
     float key = max(dot(n, vec3(-.38, .56, .73)), 0.);
     float fill = max(dot(n, vec3(.73, -.1, .67)), 0.);
     vec3 sky = mix(vec3(.1, .09, .1), vec3(.22, .24, .27), up * .5 + .5);
     vec3 light = sky * open + cavity * (key * vec3(.86, .83, .78) + fill * vec3(.15, .17, .21));
     float shine = pow(max(dot(n, normalize(vec3(-.38, .56, 1.73))), 0.), 40.) * .05 * open;
     // Light that has passed through tissue: folds turn warm instead of black.
-    vec3 tone = pow(colour, vec3(1.35 - .35 * open));
+    vec3 tone = pow(colour, vec3(1.7 - .7 * open));
     pixel = vec4(pow(tone * light + shine, vec3(1. / 2.2)), 1);
 }
