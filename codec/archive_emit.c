@@ -70,16 +70,6 @@ static bool fits_float(const double affine[3][4]) {
 
 static void emit_structure(lathe_bytes *bytes, const lathe_header_structure *s,
                            const lathe_header_structure *previous) {
-    size_t shared = 0, length = strlen(s->name);
-    while (shared < length && s->name[shared] == previous->name[shared]) shared++;
-    lathe__emit_varint(bytes, shared);
-    lathe__emit_varint(bytes, length - shared);
-    lathe__emit(bytes, s->name + shared, length - shared);
-    lathe__emit(bytes, s->rgb, 3);
-    uint64_t step = (uint64_t)s->label - (uint64_t)previous->label;
-    int64_t delta;
-    memcpy(&delta, &step, sizeof delta);
-    lathe__emit_varint(bytes, lathe__zigzag64(delta));
     for (int i = 0; i < 3; i++) lathe__emit_varint(bytes, lathe__zigzag(s->origin[i] - previous->origin[i]));
     for (int i = 0; i < 3; i++) lathe__emit_varint(bytes, (uint32_t)s->size[i]);
     lathe__emit_u8(bytes, s->level_count);

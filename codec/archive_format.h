@@ -21,7 +21,7 @@ enum {
     LATHE_MODEL_NAME_MAX = 255,
     LATHE_MAX_STRUCTURES = 65535,
     LATHE_MAX_PARAMETERS = 16,
-    LATHE_STRUCTURE_MIN_BYTES = 13,   /* the shortest structure entry of a header */
+    LATHE_STRUCTURE_MIN_BYTES = 7,    /* the shortest structure entry of a header */
     LATHE_LEVEL_STATS_MIN_BYTES = 13, /* the shortest entry of a structure's level in a footer */
     LATHE_MAX_HEADER_BYTES = 1 << 24,
     LATHE_MAX_PACKET_BYTES = 1 << 30
@@ -59,7 +59,8 @@ static inline uint64_t lathe__zigzag64(int64_t v) { return (uint64_t)v << 1 ^ (v
 /* ---- header record ---- */
 
 typedef struct lathe_header_structure {
-    char name[LATHE_NAME_MAX + 1]; /* not empty; the parser does not check that it is UTF-8, lathe_model_open does */
+    /* Not in the header record but in the footer, for people; a decoder leaves them empty. */
+    char name[LATHE_NAME_MAX + 1];
     uint8_t rgb[3];
     uint8_t level_count; /* 1 .. LATHE_MAX_LEVELS: it has packets in the records of levels 0 .. level_count - 1 */
     int64_t label;       /* -1: a threshold */
@@ -78,7 +79,7 @@ typedef struct lathe_header {
 } lathe_header;
 
 /* Parses the header record at the reader and moves behind it. MORE: not all there (*out is untouched; reader->lacking is
- * exact as soon as the size is there). Allocates at most 12 times the record's size, and that only when the record is
+ * exact as soon as the size is there). Allocates at most 24 times the record's size, and that only when the record is
  * complete and its checksum right. */
 lathe_status lathe__header_parse(lathe_header *out, lathe_reader *reader);
 void lathe__header_free(lathe_header *header); /* clears; a zeroed one is fine */

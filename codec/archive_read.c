@@ -53,11 +53,7 @@ static lathe_status read_trailer(lathe_model *model, lathe_error *err) {
     return LATHE_OK;
 }
 
-static lathe_status read_header(lathe_model *model, lathe_reader *reader, lathe_error *err) {
-    if (lathe__header_parse(&model->header, reader)) return reader_failure(reader, model, err);
-    for (uint32_t i = 0; i < model->header.structure_count; i++)
-        if (!lathe__name_valid(model->header.structures[i].name, strlen(model->header.structures[i].name)))
-            return lathe_fail(err, LATHE_ERR_FORMAT, "damaged archive: the name of structure %u is not UTF-8", i);
+static lathe_status check_names(const lathe_model *model, lathe_error *err) {
     int64_t twin = lathe__header_duplicate(&model->header);
     if (twin == -2) return lathe_fail(err, LATHE_ERR_MEMORY, "out of memory");
     if (twin >= 0)
@@ -148,8 +144,11 @@ static void read_footer_body(lathe_model *model, lathe_reader *reader) {
     model->info.iso = lathe__read_f64(reader);
     read_model_levels(model, reader);
     if (reader->status || allocate_info(model, reader)) return;
+    static const lathe_header_structure nobody = {.level_count = 0};
     lathe_level_info *levels = model->levels;
     for (uint32_t i = 0; i < model->header.structure_count && !reader->status; i++) {
+        lathe_header_structure *s = &model->header.structures[i];
+        lathe__parse_identity(s, reader, i ? s - 1 : &nobody);
         model->structures[i].levels = levels;
         read_structure_levels(levels, model->header.structures[i].level_count, reader);
         levels += model->header.structures[i].level_count;
@@ -272,9 +271,10 @@ static lathe_status read_archive(lathe_model *model, lathe_error *err) {
     lathe_status status = read_trailer(model, err);
     if (status) return status;
     lathe_reader reader = lathe__reader(model->bytes, model->footer);
-    status = read_header(model, &reader, err);
-    if (!status) status = read_records(model, &reader, err);
+    if (lathe__header_parse(&model->header, &reader)) return reader_failure(&reader, model, err);
+    status = read_records(model, &reader, err);
     if (!status) status = read_footer(model, err);
+    if (!status) status = check_names(model, err);
     if (!status) fill_info(model);
     return status;
 }

@@ -194,8 +194,11 @@ static void emit_footer(lathe_bytes *footer, const lathe_archive_writer *writer,
         lathe__emit_varint(footer, writer->record_bytes[i]);
         emit_counts(footer, &stats->levels[i]);
     }
-    for (uint32_t i = 0; i < header->structure_count; i++)
+    static const lathe_header_structure nobody = {.level_count = 0};
+    for (uint32_t i = 0; i < header->structure_count; i++) {
+        lathe__emit_identity(footer, &header->structures[i], i ? &header->structures[i - 1] : &nobody);
         emit_structure_levels(footer, stats->structures[i], header->structures[i].level_count);
+    }
     lathe__emit_checksum(footer, 0);
 }
 

@@ -42,8 +42,11 @@ lathe_status lathe__star_outline(lathe_outline *out, lathe_arena *arena, const l
             /* Holes have the region on the left, too: their rays go round clockwise. */
             uint32_t ray = star->hole ? star->rays - 1 - k : k;
             lathe_point d = lathe__ray_direction(ray, star->rays), at;
-            at.x = centre.x + (int32_t)((int64_t)star->radius[ray] * step * d.x / LATHE_RAY_LENGTH);
-            at.y = centre.y + (int32_t)((int64_t)star->radius[ray] * step * d.y / LATHE_RAY_LENGTH);
+            int64_t length = (int64_t)star->radius[ray] * step;
+            /* The largest frame's diagonal is shorter; a point twice as far would leave the range that differences have. */
+            if (length > (int64_t)1 << 29) return LATHE_ERR_FORMAT;
+            at.x = centre.x + (int32_t)(length * d.x / LATHE_RAY_LENGTH);
+            at.y = centre.y + (int32_t)(length * d.y / LATHE_RAY_LENGTH);
             out->ray[out->point_count] = (int32_t)ray;
             out->points[out->point_count++] = lathe__jitter((lathe_point){at.x & ~1, at.y & ~1}, seed);
         }

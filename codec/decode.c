@@ -180,8 +180,4 @@ const lathe_transform *lathe_decoder_transform(const lathe_decoder *d, uint32_t 
 
 uint32_t lathe_decoder_structures(const lathe_decoder *d) { return d->has_header ? d->header.structure_count : 0; }
 
-const char *lathe_decoder_structure_name(const lathe_decoder *d, uint32_t structure) {
-    return d->has_header && structure < d->header.structure_count ? d->header.structures[structure].name : "";
-}
-
 const char *lathe_decoder_error(const lathe_decoder *d) { return d->failure ? d->fault : ""; }

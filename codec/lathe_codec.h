@@ -33,7 +33,6 @@ void lathe_decoder_build_meshes(lathe_decoder *decoder, bool build);
 const lathe_mesh *lathe_decoder_mesh(lathe_decoder *decoder, uint32_t structure);
 const lathe_transform *lathe_decoder_transform(const lathe_decoder *decoder, uint32_t structure);
 uint32_t lathe_decoder_structures(const lathe_decoder *decoder);      /* 0 until the header is in */
-const char *lathe_decoder_structure_name(const lathe_decoder *decoder, uint32_t structure);
 const char *lathe_decoder_error(const lathe_decoder *decoder);        /* detail of the failure, "" if none */
 
 /* ---- archives ------------------------------------------------------------------------------------------------------ */

@@ -64,7 +64,6 @@ lathe_status EXPORT(mesh)(uint32_t structure) {
 
 const char *EXPORT(error_text)(void) { return decoder ? lathe_decoder_error(decoder) : ""; }
 uint32_t EXPORT(structures)(void) { return decoder ? lathe_decoder_structures(decoder) : 0; }
-const char *EXPORT(structure_name)(uint32_t structure) { return lathe_decoder_structure_name(decoder, structure); }
 
 static uint64_t hash_bytes(uint64_t hash, const void *bytes, size_t size) {
     const uint8_t *at = bytes;
