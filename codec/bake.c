@@ -210,8 +210,8 @@ static lathe_status write_levels(bake *b, lathe_archive_writer *writer, const la
 static lathe_status write_archive(bake *b, lathe_sink sink, void *context) {
     lathe_archive_writer *writer = NULL;
     lathe_level_info levels[LATHE_MAX_LEVELS];
-    lathe_packet *packets = calloc(b->count, sizeof *packets);
-    const lathe_level_info **structures = calloc(b->count, sizeof *structures);
+    lathe_packet *packets = calloc(b->count + 1, sizeof *packets);
+    const lathe_level_info **structures = calloc(b->count + 1, sizeof(void *));
     lathe_status status = packets && structures ? LATHE_OK : LATHE_ERR_MEMORY;
     if (!status) status = lathe__archive_begin(&writer, &b->header, sink, context, b->err);
     for (size_t s = 0; !status && s < b->count; s++) {
@@ -237,7 +237,10 @@ static lathe_status prepare(bake *b) {
     const lathe_bake_options *o = b->options;
     b->count = o->structure_count ? o->structure_count : 1;
     b->boundary = o->boundary >= 0 ? (lathe_boundary)o->boundary : o->structure_count ? LATHE_BOUNDARY_EDGE : LATHE_BOUNDARY_ISO;
-    if (b->count > LATHE_MAX_STRUCTURES) return lathe_fail(b->err, LATHE_ERR_LIMIT, "%zu structures: at most %d", b->count, LATHE_MAX_STRUCTURES);
+    if (b->count > LATHE_MAX_STRUCTURES) {
+        lathe_fail(b->err, LATHE_ERR_LIMIT, "%zu structures: at most %d", b->count, LATHE_MAX_STRUCTURES);
+        return LATHE_ERR_LIMIT;
+    }
     b->header.axis = o->axis;
     b->header.boundary = b->boundary;
     memcpy(b->header.affine, b->volume->affine, sizeof b->header.affine);
@@ -246,7 +249,10 @@ static lathe_status prepare(bake *b) {
     b->header.structure_count = (uint32_t)b->count;
     b->header.structures = calloc(b->count, sizeof *b->header.structures);
     b->baked = calloc(b->count, sizeof *b->baked);
-    if (!b->header.structures || !b->baked) return lathe_fail(b->err, LATHE_ERR_MEMORY, "out of memory");
+    if (!b->header.structures || !b->baked) {
+        lathe_fail(b->err, LATHE_ERR_MEMORY, "out of memory");
+        return LATHE_ERR_MEMORY;
+    }
     for (size_t i = 0; i < b->count; i++) {
         lathe_header_structure *h = &b->header.structures[i];
         lathe__name_clean(h->name, sizeof h->name, o->structure_count ? o->structures[i].name : o->name ? o->name : "surface");

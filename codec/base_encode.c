@@ -11,7 +11,8 @@ static void put_number(lathe_range_encoder *e, lathe_number_model *m, int32_t v)
     if (!v) return;
     put_bit(e, &m->bit[1], v < 0);
     uint32_t a = (uint32_t)(v < 0 ? -v : v);
-    int length = 31 - __builtin_clz(a);
+    int length = 0;
+    while (a >> length > 1) length++;
     for (int i = 0; i < length; i++) put_bit(e, &m->bit[2 + i], 1);
     put_bit(e, &m->bit[2 + length], 0);
     for (int i = length - 1; i >= 0; i--)
@@ -23,7 +24,7 @@ static void put_star(lathe_range_encoder *e, lathe_number_model *m, const lathe_
                      const lathe_mask *frame) {
     int32_t expected = before && index < before->count ? (int32_t)index + 1 : 0;
     put_number(e, &m[LATHE_BASE_PARENT], star->parent - expected);
-    const lathe_star *parent = star->parent ? &before->stars[star->parent - 1] : NULL;
+    const lathe_star *parent = before && star->parent ? &before->stars[star->parent - 1] : NULL;
     put_number(e, &m[LATHE_BASE_HOLE], (star->hole ? 1 : 0) - (parent && parent->hole ? 1 : 0));
     put_number(e, &m[LATHE_BASE_RAYS], __builtin_ctz(star->rays) - (parent ? __builtin_ctz(parent->rays) : 3));
     for (int k = 0; k < 2; k++)

@@ -1,5 +1,5 @@
 /** The page with a model: brings stream, picture and controls together. */
-import { bytesOfBase64, bytesOfText } from './bytes';
+import { bytesOfBase64, bytesOfText, WASM_KEY } from './bytes';
 import { Camera } from './camera';
 import { attachControls } from './controls';
 import { byId, showMessage } from './dom';
@@ -108,5 +108,5 @@ export function runViewer(model: Manifest, script: string) {
     const structure = new URLSearchParams(location.search).get('structure');
     const url = `${location.origin}/models/${encodeURIComponent(model.id)}/stream?from=1`
         + (structure ? '&structure=' + encodeURIComponent(structure) : '');
-    ask({ start: { wasm: bytesOfText(byId('wasm').textContent!), base, url: last ? url : '' } });
+    ask({ start: { wasm: bytesOfText(byId('wasm').textContent!, WASM_KEY), base, url: last ? url : '' } });
 }
