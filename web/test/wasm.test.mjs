@@ -1,0 +1,128 @@
+// The wasm decoder in node: the same meshes as the native one, and no input that traps it.
+// LATHE_HASH_STREAM=FILE with LATHE_HASH_EXPECT=FILE (lines as `lathe hash --each` prints them) checks another stream.
+import assert from 'node:assert/strict';
+import { execFile } from 'node:child_process';
+import { readFile } from 'node:fs/promises';
+import { join } from 'node:path';
+import { before, test } from 'node:test';
+import { fileURLToPath } from 'node:url';
+import { promisify } from 'node:util';
+import { program, serve, withFolder, writeLabels } from './browser.mjs';
+
+process.chdir(fileURLToPath(new URL('..', import.meta.url)));
+const run = promisify(execFile);
+
+const module = await WebAssembly.compile(await readFile(process.env.LATHE_WASM ?? '../build/wasm/lathe.wasm'));
+const open = async () => (await WebAssembly.instantiate(module)).exports;
+
+function feed(wasm, bytes) {
+    const address = wasm.input(bytes.length);
+    assert.ok(address);
+    new Uint8Array(wasm.memory.buffer).set(bytes, address);
+    return wasm.feed(bytes.length);
+}
+
+/** Steps to the end: the last status. */
+function stepAll(wasm, each = () => {}) {
+    for (;;) {
+        const status = wasm.step();
+        if (status) return status;
+        each(...new Uint32Array(wasm.memory.buffer, wasm.report_words(), 9));
+    }
+}
+
+const hashes = (wasm) => Array.from({ length: wasm.structures() },
+    (_, i) => BigInt.asUintN(64, wasm.mesh_hash(i)).toString(16).padStart(16, '0'));
+
+let stream, expected;
+
+before(() => withFolder(async (folder) => {
+    const archive = join(folder, 'shapes.lathe');
+    await run(program, ['bake', await writeLabels(folder), '--labels', 'all', '-o', archive]);
+    expected = (await run(program, ['hash', '--each', archive])).stdout.trim().split(/\s+/);
+    const server = await serve(archive);
+    stream = new Uint8Array(await (await fetch(server.url + '/models/shapes/stream?from=0')).arrayBuffer());
+    await server.stop();
+}));
+
+test('nothing is imported', () => assert.deepEqual(WebAssembly.Module.imports(module), []));
+
+test('the same meshes as the native decoder, whatever the portions', async () => {
+    for (const size of [1, 7, 100, stream.length]) {
+        const wasm = await open();
+        for (let at = 0; at < stream.length; at += size) {
+            assert.equal(feed(wasm, stream.subarray(at, at + size)), 0);
+            assert.equal(stepAll(wasm), 1);
+        }
+        assert.deepEqual(hashes(wasm), expected);
+    }
+});
+
+test('another stream, if one is given', { skip: !process.env.LATHE_HASH_STREAM }, async () => {
+    const wasm = await open();
+    assert.equal(feed(wasm, await readFile(process.env.LATHE_HASH_STREAM)), 0);
+    assert.equal(stepAll(wasm), 1);
+    assert.deepEqual(hashes(wasm), (await readFile(process.env.LATHE_HASH_EXPECT, 'utf8')).trim().split(/\s+/));
+});
+
+test('meshes for the GPU: closed, unit normals, openness between 0 and 1', async () => {
+    const wasm = await open();
+    feed(wasm, stream);
+    stepAll(wasm, (structure) => {
+        assert.equal(wasm.mesh(structure), 0);
+        const [, , , , , , vertices, triangles, start] = new Uint32Array(wasm.memory.buffer, wasm.report_words(), 9);
+        const memory = wasm.memory.buffer;
+        const positions = new Float32Array(memory, start, 3 * vertices);
+        const shading = new Int16Array(memory, start + 12 * vertices, 4 * vertices);
+        const indices = new Uint32Array(memory, start + 20 * vertices, 3 * triangles);
+        assert.ok(positions.every(Number.isFinite));
+        const edges = new Set();
+        for (let i = 0; i < indices.length; i++)
+            edges.add(indices[i] * vertices + indices[i % 3 === 2 ? i - 2 : i + 1]);
+        assert.equal(edges.size, indices.length);
+        for (const edge of edges) assert.ok(edges.has((edge % vertices) * vertices + Math.floor(edge / vertices)));
+        for (let v = 0; v < vertices; v++) {
+            const length = Math.hypot(...shading.subarray(4 * v, 4 * v + 3)) / 32767;
+            assert.ok(Math.abs(length - 1) < 1e-3 || length === 0);
+            assert.ok(shading[4 * v + 3] >= 0);
+        }
+    });
+});
+
+test('the normals of a ball point outwards', async () => {
+    const wasm = await open();
+    feed(wasm, stream);
+    stepAll(wasm);
+    wasm.mesh(0);
+    const [, , , , , , vertices, , start] = new Uint32Array(wasm.memory.buffer, wasm.report_words(), 9);
+    const positions = new Float32Array(wasm.memory.buffer, start, 3 * vertices);
+    const shading = new Int16Array(wasm.memory.buffer, start + 12 * vertices, 4 * vertices);
+    const centre = [12, 24, 24 * 1.2];
+    for (let v = 0; v < vertices; v++) {
+        const dot = centre.reduce((sum, c, i) => sum + (positions[3 * v + i] - c) * shading[4 * v + i], 0);
+        assert.ok(dot > 0);
+    }
+});
+
+test('every prefix waits for more; every flipped byte is refused or decoded, never a trap', async () => {
+    for (let size = 0; size < stream.length; size++) {
+        const wasm = await open();
+        if (size) feed(wasm, stream.subarray(0, size));
+        assert.equal(stepAll(wasm), 1);
+    }
+    for (let at = 0; at < stream.length; at++) {
+        const wasm = await open(), damaged = stream.slice();
+        damaged[at] ^= 1 << at % 8;
+        if (feed(wasm, damaged) === 0) stepAll(wasm, (structure) => wasm.mesh(structure));
+    }
+});
+
+test('memory is used again: a second mesh of the same structure needs no more', async () => {
+    const wasm = await open();
+    feed(wasm, stream);
+    stepAll(wasm);
+    for (let i = 0; i < 3; i++) wasm.mesh(1);
+    const size = wasm.memory.buffer.byteLength;
+    for (let i = 0; i < 200; i++) assert.equal(wasm.mesh(i % 2), 0);
+    assert.equal(wasm.memory.buffer.byteLength, size);
+});
