@@ -465,6 +465,9 @@ static lathe_status link_loops(overlay *o) {
                 seen = loop;
             }
     }
+    /* A cell between a chain and a single crossed edge has no vertex of that edge's loop. */
+    for (uint32_t m = 0; m < o->meeting_count; m++)
+        unite(o->block, o->side[0].loop[o->meetings[m].edge[0]], loops0 + o->side[1].loop[o->meetings[m].edge[1]]);
     memset(members, 0, (size_t)loops * 2 * sizeof *members);
     for (uint32_t i = 0; i < loops; i++) members[find(o->block, i) * 2 + (i >= loops0)]++;
     for (uint32_t i = 0; i < loops; i++) {

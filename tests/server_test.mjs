@@ -194,8 +194,7 @@ test('the stream is a slice of the archive; its parts and the deltas join to the
         const { levels: totals, structures } = (await get(`/models/${id}`)).json();
         const bytes = (infos) => infos.reduce((sum, { polar_bytes: own }) => sum + own, 0);
         assert.equal(bytes(totals), stream.length, 'polar_bytes of the model');
-        for (const { name, levels: infos } of structures.slice(0, 5).filter((structure) => !structure.name.includes('?')))
-            assert.equal(bytes(infos), (await get(`/models/${id}/stream?structure=${encodeURIComponent(name)}`)).body.length, name);
+        assert.equal(bytes(structures.flatMap((structure) => structure.levels)), stream.length, 'polar_bytes of its structures');
     }
 });
 
