@@ -107,7 +107,8 @@ $(B)/server/viewer_page.o: server/viewer_page.S $(VIEWER)
 
 # As web/wasm/README.md says: no imports, our own small C library, a stack that traps when it overflows. Optimising at link time
 # makes the compressed module 3 % smaller.
-WASM_FLAGS := --target=wasm32 -std=c11 -Oz -flto -mbulk-memory -fvisibility=hidden -ffreestanding -fno-builtin -nostdlib \
+WASM_OPTIMISE := -Oz
+WASM_FLAGS = --target=wasm32 -std=c11 $(WASM_OPTIMISE) -flto -mbulk-memory -fvisibility=hidden -ffreestanding -fno-builtin -nostdlib \
               -ffp-contract=off -ffunction-sections -fdata-sections -DNDEBUG -Wall -Wextra -Werror \
               -isystem web/wasm/include -Icore -Icodec -Iweb/wasm -MMD -MP
 WASM_LINK := --no-entry --gc-sections --strip-all --stack-first -z stack-size=262144 -O2 --lto-O2 --compress-relocations
@@ -116,6 +117,9 @@ WASM_BUILTINS = $(firstword $(shell find -L $$($(CLANG) -print-resource-dir)/lib
 .PHONY: wasm web
 wasm: $(WASM) ## the decoder as wasm: build/wasm/lathe.wasm
 web: $(VIEWER) ## the viewer page: web/dist/viewer.html
+
+# Where the time goes: 0.5 kB more, a seventh faster.
+$(patsubst %.c,build/wasm/%.o,$(filter codec/occupancy_% codec/range_%,$(WASM_SOURCES))): WASM_OPTIMISE := -O2 -fno-unroll-loops
 
 build/wasm/%.o: %.c
 	@mkdir -p $(@D)

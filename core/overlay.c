@@ -602,14 +602,17 @@ static float partner_of(const overlay *o, const lathe_tube *tube, uint32_t node)
     return tube->partner[node >= o->count[0]][place];
 }
 
-/* For each vertex of p (begin .. end) the index along q of its partner; q[from] is a vertex. */
-static float *tree_targets(overlay *o, const lathe_tube *tube, const strip *s, uint32_t begin, uint32_t end, uint32_t from, bool closed) {
+/* For each vertex of p (begin .. end) the index along q of its partner; q[from] is a vertex. backward: both chains run against their
+ * loops. */
+static float *tree_targets(overlay *o, const lathe_tube *tube, const strip *s, uint32_t begin, uint32_t end, uint32_t from, bool closed,
+                           bool backward) {
     float *target = LATHE_NEW(o->arena, float, s->m + 2);
     if (!target) return NULL;
     uint32_t other, origin = place_in_loop(o, strip_node(s->q, s->q_step, s->q_size, from), &other);
     for (uint32_t i = 0; i <= s->m; i++) target[i] = i < begin ? 0 : (float)s->n;
     for (uint32_t i = begin; i < end; i++) {
         float t = partner_of(o, tube, strip_node(s->p, s->p_step, s->p_size, i)) - (float)origin;
+        if (backward) t = -t;
         if (t < 0) t += (float)other;
         /* A partner outside of this strip's chain: before its begin or behind its end, whichever is nearer. */
         if (closed ? i <= s->m / 4 && t > (float)other * 0.75f : t > ((float)s->n + (float)other) / 2) t = 0;
@@ -621,9 +624,10 @@ static float *tree_targets(overlay *o, const lathe_tube *tube, const strip *s, u
 
 /* Walks the strip by the trees, if its link is one-to-one; false: nothing was emitted. */
 static bool merge_by_trees(overlay *o, int p, strip *s, uint32_t begin, uint32_t end, uint32_t from, bool open) {
-    const lathe_tube *tube = tube_of(o, strip_node(s->p, s->p_step, s->p_size, begin));
+    uint32_t node = strip_node(s->p, s->p_step, s->p_size, begin);
+    const lathe_tube *tube = tube_of(o, node);
     if (!tube) return false;
-    s->target = tree_targets(o, tube, s, begin, end, from, !open);
+    s->target = tree_targets(o, tube, s, begin, end, from, !open, node_side(o, node) != p);
     if (s->target && merge_strip(o, p, s, open)) {
         o->counts->tree_strips++;
         return true;
@@ -661,7 +665,9 @@ static bool try_ring_strip(overlay *o, const cycle *outer, const cycle *hole) {
     const lathe_tube *tube = tube_of(o, p[0]);
     if (tube) {
         /* Begin where the trees do: at the partner of the outer loop's first vertex. */
-        uint32_t want = (uint32_t)partner_of(o, tube, p[0]);
+        float partner = partner_of(o, tube, p[0]);
+        uint32_t want = (uint32_t)partner;
+        if (node_side(o, p[0]) != outer->of && (float)want < partner) want = want + 1 < hole->count ? want + 1 : 0;
         while (from < hole->count && place_in_loop(o, q[from], &size) != want) from++;
         if (from == hole->count) from = 0;
         else least = 0;
