@@ -1,6 +1,6 @@
 /* Reading archives: lathe_model. Opening checks the structure of the whole file (header, every level record's head,
  * footer, trailer; all sizes must meet); packets' checksums are checked by lathe_model_check and by decoders. Memory:
- * at most 16 times the header's and 5 times the footer's size, whatever the bytes say. */
+ * at most 24 times the header's and 5 times the footer's size, whatever the bytes say. */
 #include "archive_write.h"
 #include "crc32c.h"
 #include <errno.h>

@@ -106,6 +106,7 @@ static lathe_status reading(lathe_decoder *d, const lathe_reader *reader, lathe_
 }
 
 static lathe_status next_packet(lathe_decoder *d, const uint8_t **payload, uint32_t *size) {
+    if (d->used == d->size) return LATHE_MORE;   /* bytes may be NULL then */
     lathe_reader reader = lathe__reader(d->bytes + d->used, d->size - d->used);
     if (!d->has_header) {
         lathe_status status = lathe__header_parse(&d->header, &reader);

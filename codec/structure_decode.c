@@ -1,6 +1,17 @@
 #include <stdlib.h>
 #include "structure_state.h"
 
+/* No ray reaches farther than the frame is wide and high together: what a packet may cost is bounded by its frame. */
+static bool stars_fit(const lathe_structure_state *state, uint32_t count) {
+    int64_t step = lathe__radius_step(lathe__level_stride(&state->plan, 0));
+    int64_t farthest = (int64_t)(state->mask.size[0] + state->mask.size[1]) * LATHE_LATTICE_ONE + step;
+    for (uint32_t i = 0; i < count; i++)
+        for (uint32_t k = 0; k < state->base[i].count; k++)
+            for (uint32_t ray = 0; ray < state->base[i].stars[k].rays; ray++)
+                if (state->base[i].stars[k].radius[ray] * step > farthest) return false;
+    return true;
+}
+
 static lathe_status decode_base(lathe_structure_state *state, lathe_reader *reader, const char **fault) {
     uint32_t kept = lathe__read_varint(reader), count;
     *fault = "base shape: list of kept slices";
@@ -23,7 +34,9 @@ static lathe_status decode_base(lathe_structure_state *state, lathe_reader *read
     lathe_range_decoder d;
     lathe__decoder_start(&d, reader->at, lathe__reader_left(reader));
     *fault = "base shape: stars";
-    return lathe__base_decode(state->base, count, &state->arena, &d, &state->mask);
+    status = lathe__base_decode(state->base, count, &state->arena, &d, &state->mask);
+    if (!status && !stars_fit(state, count)) status = LATHE_ERR_FORMAT;
+    return status;
 }
 
 static lathe_status decode_slices(lathe_structure_state *state, lathe_arena *scratch, lathe_occupancy **trained, uint32_t level,

@@ -3,7 +3,7 @@
  * outside, so the second half of this file is not a corner case. */
 #include "centre.h"
 
-enum { MAX_COORDINATE = 1 << 28, COLUMN_TRIES = 16 };
+enum { MAX_COORDINATE = (LATHE_MAX_DIM + 2) * LATHE_LATTICE_ONE, COLUMN_TRIES = 16 };
 
 typedef struct vertex {
     int32_t along, height;

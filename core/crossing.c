@@ -10,11 +10,11 @@
  * clockwise, region on the left: reverse its points first (and turn segment s into count - 1 - s where needed); then
  * IN-OUT reads "leaves the hole", and the same edge types and grammar hold.
  *
- * All values are exact. Coordinates below 2^28: |p - centre| < 2^29, so doubled areas are < 2^60, numerators and
+ * All values are exact. Coordinates hardly above 2^28: |p - centre| < 2^29, so doubled areas are < 2^60, numerators and
  * denominators (cross products with a direction of length 2^14) < 2^46. */
 #include "contour.h"
 
-enum { MAX_COORDINATE = 1 << 28 };
+enum { MAX_COORDINATE = (LATHE_MAX_DIM + 2) * LATHE_LATTICE_ONE };
 static const uint64_t MAX_CROSSINGS = UINT32_MAX / 8;
 
 typedef struct vector {

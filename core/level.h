@@ -32,8 +32,6 @@ uint32_t lathe__choose_rays(int64_t reach, uint32_t coarseness);
 lathe_status lathe__refine_outline(lathe_outline *out, lathe_arena *arena, const lathe_outline *loops, uint32_t coarseness,
                                    uint32_t seed);
 lathe_point lathe__jitter(lathe_point p, uint32_t seed);
-/* True if no two edges of the outline meet, loops are as nested as orientation says, and every loop has three vertices. */
-lathe_status lathe__outline_is_simple(bool *simple, lathe_arena *arena, const lathe_outline *outline);
 
 /* What a stack of outlines became. */
 typedef struct lathe_surface_counts {

@@ -548,7 +548,7 @@ static bool merge_strip(overlay *o, int p, const strip *s, bool open) {
             /* Corresponding edges leave the choice of their diagonal; a corresponding vertex waits. */
             float t = s->target[i + 1];
             if (t <= (float)j) can_q = false;
-            else if (t > (float)(j + 1)) can_p = false;
+            else if (t > (float)(j + 1) || s->target[i] >= (float)(j + 1)) can_p = false;
         }
         if (can_p && can_q) {
             double dx = (double)at[a1].x - at[b].x, dy = (double)at[a1].y - at[b].y;

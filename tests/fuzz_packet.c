@@ -1,0 +1,38 @@
+/* libFuzzer target: the packets of one structure of 20 x 20 x 6 voxels, without a container around them. The first two bytes say
+ * where the input is cut into the packets of levels 0, 1 and 2; after each, the mesh that a viewer would show is built. */
+#include <stdlib.h>
+#include "structure_state.h"
+
+static void check_mesh(const lathe_mesh *mesh) {
+    for (uint32_t i = 0; i < mesh->triangle_count; i++)
+        for (int k = 0; k < 3; k++)
+            if (mesh->triangles[i][k] >= mesh->vertex_count) abort();
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size);
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
+    static lathe_occupancy *trained; /* training takes longer than everything else here */
+    if (size < 2) return 0;
+    size_t left = size - 2, first = left * bytes[0] / 255, second = (left - first) * bytes[1] / 255;
+    size_t begin[4] = {2, 2 + first, 2 + first + second, size};
+    lathe_structure_state state = {.mask = {.size = {20, 20, 6}, .row_words = 1}, .fraction = 28, .level = -1};
+    lathe_arena arena[2] = {{0}, {0}};
+    state.plan = (lathe_level_plan){.slices = 6, .level_count = 3};
+    for (uint32_t level = 0; level < 3; level++) {
+        const char *fault = "";
+        lathe_status status = lathe__structure_decode(&state, &arena[0], &trained, level, bytes + begin[level],
+                                                      begin[level + 1] - begin[level], &fault);
+        if (status > 0 || (status && !fault[0])) abort();
+        if (status) break;
+        lathe_mesh mesh = {0};
+        lathe_surface_counts counts;
+        uint32_t shown;
+        lathe__arena_reset(&arena[0]);
+        if (lathe__state_mesh(&mesh, arena, &state, &counts, &shown) == LATHE_OK) check_mesh(&mesh);
+        lathe_mesh_free(&mesh);
+    }
+    lathe__state_free(&state);
+    lathe__arena_free(&arena[0]);
+    lathe__arena_free(&arena[1]);
+    return 0;
+}
