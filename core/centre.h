@@ -10,6 +10,6 @@
  * three lattice units all about that column; for such and other degenerate loops some point near it, and parsing its
  * contour then says FORMAT. Areas are exact up to the rounding of cut points to the lattice; O(points) for loops of
  * short segments, O(points * 29) at worst. Odd coordinates are preferred: traced outlines have even ones, so that no
- * vertex lies on a ray along the axes. RANGE: no points, or coordinates not below 2^28. MEMORY. */
+ * vertex lies on a ray along the axes. RANGE: no points, or coordinates not below 4098 pixels. MEMORY. */
 lathe_status lathe__loop_centre(lathe_point *centre, lathe_arena *arena, const lathe_point *points, uint32_t count);
 #endif

@@ -139,7 +139,7 @@ static lathe_status count_crossings(uint64_t *total, uint32_t *sectors, const ca
     return sum > MAX_CROSSINGS ? LATHE_ERR_LIMIT : LATHE_OK;
 }
 
-/* RANGE: rays not a power of two in 4..65536, coordinates not below 2^28. LIMIT: more than 2^29 crossings. */
+/* RANGE: rays not a power of two in 4..65536, coordinates not below 4098 pixels. LIMIT: more than 2^29 crossings. */
 lathe_status lathe__cast_rays(lathe_crossing **out, uint32_t *count, lathe_arena *arena, const lathe_point *points,
                               uint32_t point_count, lathe_point centre, uint32_t rays) {
     if (rays < 4 || rays > 65536 || (rays & (rays - 1)) || !small_enough(centre)) return LATHE_ERR_RANGE;

@@ -252,7 +252,7 @@ static void test_square(void) {
 static void test_hostile(void) {
     lathe_arena arena = {0};
     lathe_crossing *c;
-    lathe_point centre, big[3] = {{1 << 28, 0}, {0, 1}, {0, 0}}, same[3] = {{5, 5}, {5, 5}, {5, 5}},
+    lathe_point centre, big[3] = {{(LATHE_MAX_DIM + 2) * LATHE_LATTICE_ONE, 0}, {0, 1}, {0, 0}}, same[3] = {{5, 5}, {5, 5}, {5, 5}},
                         line[2] = {{-9, 0}, {9, 0}};
     uint32_t count;
     CHECK_EQ(lathe__cast_rays(&c, &count, &arena, big, 3, (lathe_point){0, 0}, 8), LATHE_ERR_RANGE);
@@ -272,7 +272,7 @@ static void test_hostile(void) {
     for (int i = 0; i < 20000; i++) {
         lathe_point p[12];
         uint32_t n = 1 + (uint32_t)shape_below(&seed, 12);
-        int32_t range = i & 1 ? 4 : (1 << 28) - 1;
+        int32_t range = i & 1 ? 4 : ((LATHE_MAX_DIM + 2) * LATHE_LATTICE_ONE) - 1;
         for (uint32_t k = 0; k < n; k++)
             p[k] = (lathe_point){shape_below(&seed, 2 * range + 1) - range, shape_below(&seed, 2 * range + 1) - range};
         bad += lathe__loop_centre(&centre, &arena, p, n) != LATHE_OK;
