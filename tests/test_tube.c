@@ -287,7 +287,7 @@ static void shifted_discs(tally *sum) {
             disc(at[0], 10.5, 10.5, 8.3, 1);
             disc(at[1], 10.5 + dx, 10.5 + dy, 8.3, 1);
             slab s = {.side = {trace((const uint8_t(*)[SHAPE_SIZE])at[0], 0, 32), trace((const uint8_t(*)[SHAPE_SIZE])at[1], 1, 32)}};
-            char what[40];
+            char what[64];
             snprintf(what, sizeof what, "disc shifted by %d, %d", dx, dy);
             tally one = {0};
             check_slab(&s, &one, what);
@@ -302,7 +302,7 @@ static void random_pairs(tally *sum) {
     uint64_t seed = 12;
     for (int i = 0; i < 3000 && check_failed < 20; i++) {
         shape a, b;
-        char what[40];
+        char what[64];
         snprintf(what, sizeof what, "random pair %d", i);
         shape_make(&a, &seed, i);
         b = a;
