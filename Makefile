@@ -29,7 +29,7 @@ CHECKS := $(basename $(notdir $(wildcard tests/*_check.cpp)))
 FUZZERS := $(basename $(notdir $(wildcard tests/fuzz_*.c)))
 
 # The decoder. Linking it proves that it needs no volume, no ray casting on grey values and no file.
-WASM_SOURCES := $(addprefix core/,status.c arena.c ray.c crossing.c contour.c grammar.c tiling.c centre.c outline.c triangulate.c \
+WASM_SOURCES := $(addprefix core/,status.c arena.c ray.c crossing.c contour.c grammar.c tiling.c centre.c grid.c outline.c triangulate.c \
                   overlay.c tube.c builder.c level.c refinement.c mask.c mesh.c) \
                 $(addprefix codec/,range_decoder.c occupancy_model.c occupancy_decode.c base_shape.c base_decode.c \
                   structure_state.c structure_decode.c archive_parse.c crc32c.c decode.c) \
@@ -108,8 +108,8 @@ $(B)/server/viewer_page.o: server/viewer_page.S $(VIEWER)
 # As web/wasm/README.md says: no imports, our own small C library, a stack that traps when it overflows. Optimising at link time
 # makes the compressed module 3 % smaller.
 WASM_OPTIMISE := -Oz
-WASM_FLAGS = --target=wasm32 -std=c11 $(WASM_OPTIMISE) -flto -mbulk-memory -fvisibility=hidden -ffreestanding -fno-builtin -nostdlib \
-              -ffp-contract=off -ffunction-sections -fdata-sections -DNDEBUG -Wall -Wextra -Werror \
+WASM_FLAGS = --target=wasm32 -std=c11 $(WASM_OPTIMISE) -flto -mbulk-memory -mnontrapping-fptoint -msign-ext -fvisibility=hidden -ffreestanding \
+              -fno-builtin -nostdlib -DLATHE_SMALL -ffp-contract=off -ffunction-sections -fdata-sections -DNDEBUG -Wall -Wextra -Werror \
               -isystem web/wasm/include -Icore -Icodec -Iweb/wasm -MMD -MP
 WASM_LINK := --no-entry --gc-sections --strip-all --stack-first -z stack-size=262144 -O2 --lto-O2 --compress-relocations
 WASM_BUILTINS = $(firstword $(shell find -L $$($(CLANG) -print-resource-dir)/lib -name 'libclang_rt.builtins*wasm32*.a' 2>/dev/null))

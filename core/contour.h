@@ -22,6 +22,21 @@ typedef struct lathe_outline {
     int32_t *ray;              /* per point: index of the ray that meets the loop there, or -1 (between rays) */
 } lathe_outline;
 
+/* Helpers that are used in many places: fast where code may be large, shared where it must be small (wasm). */
+#ifdef LATHE_SMALL
+#define LATHE_HELPER __attribute__((weak, noinline))
+int64_t lathe__turn(const lathe_point *at, uint32_t a, uint32_t b, uint32_t c);
+#else
+#define LATHE_HELPER static inline
+#endif
+/* Twice the area of the triangle at[a] at[b] at[c], positive if it is counter-clockwise. Exact: coordinates are below 2^29. */
+LATHE_HELPER int64_t lathe__turn(const lathe_point *at, uint32_t a, uint32_t b, uint32_t c) {
+    return (int64_t)(at[b].x - at[a].x) * (at[c].y - at[a].y) - (int64_t)(at[b].y - at[a].y) * (at[c].x - at[a].x);
+}
+static inline int64_t lathe__orient(lathe_point a, lathe_point b, lathe_point c) {
+    return lathe__turn((const lathe_point[]){a, b, c}, 0, 1, 2);
+}
+
 /* ray.c: directions from an integer table, so that all platforms agree: |direction| is about 2^14. rays: power of two <= 65536. */
 enum { LATHE_RAY_LENGTH = 1 << 14 };
 lathe_point lathe__ray_direction(uint32_t ray, uint32_t rays);
@@ -38,6 +53,8 @@ typedef struct lathe_crossing {
     bool outward;              /* the next crossing of the walk lies further out (where it is on the same ray: UP, else DOWN) */
     int64_t numerator, denominator; /* position on the segment: i + numerator/denominator, 0 <= n < d */
 } lathe_crossing;
+/* a/b against c/d (b, d > 0): -1, 0 or 1. */
+int lathe__compare_fractions(uint64_t a, uint64_t b, uint64_t c, uint64_t d);
 /* Upper bound of crossings is not known beforehand: *out is arena memory. */
 lathe_status lathe__cast_rays(lathe_crossing **out, uint32_t *count, lathe_arena *arena, const lathe_point *points,
                               uint32_t point_count, lathe_point centre, uint32_t rays);

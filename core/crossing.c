@@ -34,9 +34,8 @@ static bool small_enough(lathe_point p) {
     return p.x > -MAX_COORDINATE && p.x < MAX_COORDINATE && p.y > -MAX_COORDINATE && p.y < MAX_COORDINATE;
 }
 
-/* a/b against c/d (b, d > 0): -1, 0 or 1, by continued fractions, which end after one or two steps for all but near
- * ties. */
-static int compare_fractions(uint64_t a, uint64_t b, uint64_t c, uint64_t d) {
+/* By continued fractions, which end after one or two steps for all but near ties. */
+int lathe__compare_fractions(uint64_t a, uint64_t b, uint64_t c, uint64_t d) {
     for (int sign = 1;; sign = -sign) {
         uint64_t left = a / b, right = c / d;
         if (left != right) return left < right ? -sign : sign;
@@ -60,7 +59,7 @@ static int32_t rays_passed(vector p, vector q, uint32_t sector_p, uint32_t secto
 /* Whether b, the next crossing of the walk on the ray of a, is further out. Both in one vertex (the tip of a spike
  * whose right flank the ray just misses): the walk turns towards the centre by a left turn. */
 static bool further_out(const hit *a, const hit *b, const lathe_point *points, uint32_t count) {
-    int order = compare_fractions(a->reach, a->divisor, b->reach, b->divisor);
+    int order = lathe__compare_fractions(a->reach, a->divisor, b->reach, b->divisor);
     if (order) return order < 0;
     vector along_a = from(points[a->segment], points[(a->segment + 1) % count]);
     vector along_b = from(points[b->segment], points[(b->segment + 1) % count]);

@@ -13,10 +13,9 @@ lathe_status lathe__builder_reserve(lathe_mesh_builder *builder, size_t vertices
 
 /* One outline crossing another, in the plane of projection. */
 typedef struct lathe_meeting {
-    uint32_t edge[2];          /* start vertex of the edge of the lower [0] and the upper [1] outline */
+    uint32_t edge[2];          /* of the lower [0] and the upper [1] outline */
     uint32_t rank[2];          /* order along each edge */
     double numerator[2], denominator[2];   /* exact whole numbers below 2^53 where ranks need them, see overlay.c */
-    int32_t x, y;              /* rounded to the lattice */
     bool enters;               /* the lower outline enters the upper region here */
 } lathe_meeting;
 
@@ -59,7 +58,4 @@ typedef struct lathe_polygon {
  * or UINT32_MAX on the boundary. Always ends with a topological disk with holes, whatever the positions are. */
 lathe_status lathe__triangulate(uint32_t (**triangles)[3], uint32_t **neighbour, uint32_t *count, lathe_arena *arena,
                                 const lathe_polygon *polygon);
-static inline int64_t lathe__orient(lathe_point a, lathe_point b, lathe_point c) {
-    return (int64_t)(b.x - a.x) * (c.y - a.y) - (int64_t)(b.y - a.y) * (c.x - a.x);
-}
 #endif

@@ -2,9 +2,10 @@
  * crosses itself, a neighbour, or steps over a small loop [M figure 6]; the cure is that of Ho, Kim & Kim: the piece of loop that
  * an offending edge stands for is expanded at its farthest vertex, until nothing offends. Whole loops are simple, so it ends. */
 #include <string.h>
+#include "grid.h"
 #include "level.h"
 
-enum { NONE = 0xffffffffu };
+enum { NONE = 0xffffffffu, CELLS_PER_PIECE = 2 };
 
 typedef struct piece {         /* an edge of the contour, from a kept vertex to the next one kept */
     uint32_t from, to;         /* vertices of the loops; to comes after from in the loop, cyclically */
@@ -79,82 +80,39 @@ static uint32_t list_pieces(refinement *r) {
     return r->piece_count = n;
 }
 
-static int64_t orient(const refinement *r, uint32_t a, uint32_t b, uint32_t c) { return lathe__orient(r->at[a], r->at[b], r->at[c]); }
-
 static bool pieces_meet(const refinement *r, const piece *p, const piece *q) {
     if (p->from == q->from || p->from == q->to || p->to == q->from || p->to == q->to) return false;
-    int64_t s = orient(r, p->from, p->to, q->from), t = orient(r, p->from, p->to, q->to);
-    if ((s > 0 && t > 0) || (s < 0 && t < 0)) return false;
-    s = orient(r, q->from, q->to, p->from), t = orient(r, q->from, q->to, p->to);
-    return !((s > 0 && t > 0) || (s < 0 && t < 0));
+    return lathe__segments_meet(r->at, p->from, p->to, q->from, q->to);
 }
 
-typedef struct range { int32_t x0, x1, y0, y1; } range;
-static range extent(lathe_point a, lathe_point b) {
-    return (range){a.x < b.x ? a.x : b.x, a.x < b.x ? b.x : a.x, a.y < b.y ? a.y : b.y, a.y < b.y ? b.y : a.y};
-}
-
-/* Marks the pieces that meet another one. A grid of squares of about the pieces' length. */
+/* Marks the pieces that meet another one. */
 static lathe_status mark_meetings(refinement *r, bool *found) {
-    range all = {INT32_MAX, INT32_MIN, INT32_MAX, INT32_MIN};
-    double length = 0;
-    for (uint32_t i = 0; i < r->piece_count; i++) {
-        range e = extent(r->at[r->pieces[i].from], r->at[r->pieces[i].to]);
-        if (e.x0 < all.x0) all.x0 = e.x0;
-        if (e.x1 > all.x1) all.x1 = e.x1;
-        if (e.y0 < all.y0) all.y0 = e.y0;
-        if (e.y1 > all.y1) all.y1 = e.y1;
-        length += (double)(e.x1 - e.x0) + (double)(e.y1 - e.y0);
-    }
-    int shift = LATHE_LATTICE_BITS;
-    while (shift < 28 && (double)((int64_t)1 << shift) * r->piece_count < length) shift++;
-    while (shift < 28 && (uint64_t)((all.x1 - all.x0) >> shift) * (uint64_t)((all.y1 - all.y0) >> shift) > 16 * (uint64_t)r->piece_count + 64) shift++;
-    size_t width = (size_t)((all.x1 - all.x0) >> shift) + 1, height = (size_t)((all.y1 - all.y0) >> shift) + 1, total = 0;
-    uint32_t *first = LATHE_NEW(r->arena, uint32_t, width * height + 2), *entry = NULL;
-    if (!first) return LATHE_ERR_MEMORY;
-    memset(first, 0, (width * height + 2) * sizeof *first);
-    for (int pass = 0; pass < 2; pass++) {
-        for (uint32_t i = 0; i < r->piece_count; i++) {
-            range e = extent(r->at[r->pieces[i].from], r->at[r->pieces[i].to]);
-            for (size_t y = (size_t)((e.y0 - all.y0) >> shift); y <= (size_t)((e.y1 - all.y0) >> shift); y++)
-                for (size_t x = (size_t)((e.x0 - all.x0) >> shift); x <= (size_t)((e.x1 - all.x0) >> shift); x++) {
-                    if (!pass) {
-                        first[y * width + x + 2]++;
-                        total++;
-                        continue;
-                    }
-                    entry[first[y * width + x + 1]++] = i;
-                }
-        }
-        if (pass) break;
-        if (total > UINT32_MAX) return LATHE_ERR_LIMIT;
-        for (size_t c = 2; c < width * height + 2; c++) first[c] += first[c - 1];
-        entry = LATHE_NEW(r->arena, uint32_t, total);
-        if (!entry) return LATHE_ERR_MEMORY;
-    }
-    for (size_t c = 0; c < width * height; c++)
-        for (uint32_t i = first[c]; i < first[c + 1]; i++)
-            for (uint32_t k = i + 1; k < first[c + 1]; k++)
-                if (pieces_meet(r, &r->pieces[entry[i]], &r->pieces[entry[k]]))
-                    r->pieces[entry[i]].split = r->pieces[entry[k]].split = *found = true;
+    lathe_range *ranges = LATHE_NEW(r->arena, lathe_range, r->piece_count);
+    if (!ranges) return LATHE_ERR_MEMORY;
+    for (uint32_t i = 0; i < r->piece_count; i++) ranges[i] = lathe__range_of(r->at[r->pieces[i].from], r->at[r->pieces[i].to]);
+    lathe_grid grid;
+    lathe_status status = lathe__grid_build(&grid, r->arena, ranges, r->piece_count, CELLS_PER_PIECE * (uint64_t)r->piece_count);
+    if (status) return status;
+    const uint32_t *first = grid.first, *end = first + lathe__cell_at(&grid, grid.cells.x1, grid.cells.y1) + 1;
+    for (; first < end; first++)
+        for (uint32_t i = first[0]; i < first[1]; i++)
+            for (uint32_t k = i + 1; k < first[1]; k++) {
+                piece *p = &r->pieces[grid.entry[i]], *q = &r->pieces[grid.entry[k]];
+                if (pieces_meet(r, p, q)) p->split = q->split = *found = true;
+            }
     return LATHE_OK;
 }
 
 /* Is a point between a piece and the part of the loop it stands for? */
-static bool cuts_off(const refinement *r, const piece *p, lathe_point at) {
+static bool cuts_off(const refinement *r, const piece *p, uint32_t vertex) {
     const lathe_loop *loop = &r->loops->loops[p->loop];
+    const lathe_point *at = r->at;
     bool odd = false;
-    lathe_point a = r->at[p->to];
-    for (uint32_t v = p->from;; v = after(loop, v)) {
-        lathe_point b = r->at[v];
-        if ((a.y > at.y) != (b.y > at.y)) {
-            lathe_point low = a.y < b.y ? a : b, high = a.y < b.y ? b : a;
-            if (lathe__orient(low, high, at) > 0) odd = !odd;
-        }
-        a = b;
-        if (v == p->to) break;
+    for (uint32_t u = p->to, v = p->from;; u = v, v = after(loop, v)) {
+        bool up = at[v].y > at[vertex].y;
+        if ((at[u].y > at[vertex].y) != up && lathe__turn(at, up ? u : v, up ? v : u, vertex) > 0) odd = !odd;
+        if (v == p->to) return odd;
     }
-    return odd;
 }
 
 static bool is_hidden(const refinement *r, const piece *p) { return after(&r->loops->loops[p->loop], p->from) != p->to; }
@@ -176,19 +134,14 @@ static void mark_nesting(refinement *r, bool *found) {
         piece *p = &r->pieces[i];
         if (!is_hidden(r, p)) continue;
         const lathe_loop *own = &r->loops->loops[p->loop];
-        range box = extent(r->at[p->from], r->at[p->to]);
-        for (uint32_t v = p->from; v != p->to; v = after(own, v)) {
-            lathe_point a = r->at[v];
-            if (a.x < box.x0) box.x0 = a.x;
-            if (a.x > box.x1) box.x1 = a.x;
-            if (a.y < box.y0) box.y0 = a.y;
-            if (a.y > box.y1) box.y1 = a.y;
-        }
+        lathe_range box = lathe__range_of(r->at[p->from], r->at[p->to]);
+        for (uint32_t v = p->from; v != p->to; v = after(own, v)) lathe__range_add(&box, r->at[v].x, r->at[v].y);
         for (uint32_t l = 0; l < r->loops->loop_count && !p->split; l++) {
             if (l == p->loop) continue;
-            lathe_point a = r->at[r->loops->loops[l].first];
+            uint32_t v = r->loops->loops[l].first;
+            lathe_point a = r->at[v];
             if (a.x < box.x0 || a.x > box.x1 || a.y < box.y0 || a.y > box.y1) continue;
-            if (cuts_off(r, p, a)) p->split = *found = true;
+            if (cuts_off(r, p, v)) p->split = *found = true;
         }
     }
 }
@@ -202,7 +155,7 @@ static void expand(refinement *r, bool whole) {
         uint32_t farthest = NONE;
         int64_t most = -1;
         for (uint32_t v = after(loop, p->from); v != p->to; v = after(loop, v)) {
-            int64_t d = orient(r, p->from, p->to, v);
+            int64_t d = lathe__turn(r->at, p->from, p->to, v);
             if (d < 0) d = -d;
             if (whole) { r->added += !r->kept[v]; r->kept[v] = 1; }
             else if (d > most) { most = d; farthest = v; }
