@@ -30,6 +30,13 @@ enum {
 /* Of the bit mask of one structure: what a decoder may have to allocate for one small packet. 2048^3 bits. */
 #define LATHE_MAX_MASK_BYTES (UINT64_C(1) << 30)
 
+/* What is wrong with the input, for people: a small decoder has only the status' name. */
+#ifdef LATHE_SMALL
+#define LATHE_FAULT(text) ""
+#else
+#define LATHE_FAULT(text) text
+#endif
+
 /* ---- cursor: checked little-endian reads ---- */
 
 /* Once a read fails, status stays, at stays and every read gives 0: callers read on and look once. */

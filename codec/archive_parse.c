@@ -23,7 +23,7 @@ const uint8_t *lathe__read_bytes(lathe_reader *reader, size_t size) {
     if (reader->status) return NULL;
     if (size > lathe__reader_left(reader)) {
         reader->lacking = size - lathe__reader_left(reader);
-        lathe__reader_fail(reader, LATHE_MORE, "more bytes are needed");
+        lathe__reader_fail(reader, LATHE_MORE, LATHE_FAULT("more bytes are needed"));
         return NULL;
     }
     const uint8_t *bytes = reader->at;
@@ -66,7 +66,7 @@ uint64_t lathe__read_varint64(lathe_reader *reader) {
         value |= (uint64_t)(byte & 127) << shift;
         if (byte < 128) return value;
     }
-    lathe__reader_fail(reader, LATHE_ERR_FORMAT, "a number is longer than 64 bits");
+    lathe__reader_fail(reader, LATHE_ERR_FORMAT, LATHE_FAULT("a number is longer than 64 bits"));
     return 0;
 }
 
@@ -79,7 +79,7 @@ uint32_t lathe__read_varint(lathe_reader *reader) {
         value |= (uint32_t)(byte & 127) << shift;
         if (byte < 128) return value;
     }
-    lathe__reader_fail(reader, LATHE_ERR_FORMAT, "a number is longer than 32 bits");
+    lathe__reader_fail(reader, LATHE_ERR_FORMAT, LATHE_FAULT("a number is longer than 32 bits"));
     return 0;
 }
 
@@ -105,29 +105,29 @@ static bool affine_usable(const double m[3][4]) {
 }
 
 static lathe_status structure_check(const lathe_header_structure *s, const char **fault) {
-    *fault = "a structure's level count";
+    *fault = LATHE_FAULT("a structure's level count");
     if (s->level_count < 1 || s->level_count > LATHE_MAX_LEVELS) return LATHE_ERR_FORMAT;
-    *fault = "a structure's box";
+    *fault = LATHE_FAULT("a structure's box");
     for (int i = 0; i < 3; i++) {
         int32_t margin = i < 2;
         if (s->size[i] < 1 + 2 * margin || s->size[i] > LATHE_MAX_DIM + 2 * margin) return LATHE_ERR_FORMAT;
         if (s->origin[i] < -margin || s->origin[i] > LATHE_MAX_DIM - s->size[i] + margin) return LATHE_ERR_FORMAT;
     }
     uint64_t row_words = ((uint64_t)s->size[0] + 63) / 64;
-    *fault = "a structure's box is larger than 1 GiB of bits";
+    *fault = LATHE_FAULT("a structure's box is larger than 1 GiB of bits");
     return row_words * 8 * (uint64_t)s->size[1] * (uint64_t)s->size[2] > LATHE_MAX_MASK_BYTES ? LATHE_ERR_LIMIT
                                                                                               : LATHE_OK;
 }
 
 lathe_status lathe__header_check(const lathe_header *header, const char **fault) {
-    *fault = "the slice axis or the boundary";
+    *fault = LATHE_FAULT("the slice axis or the boundary");
     if ((unsigned)header->axis > LATHE_AXIS_Z || (unsigned)header->boundary > LATHE_BOUNDARY_ISO)
         return LATHE_ERR_FORMAT;
-    *fault = "the affine transform";
+    *fault = LATHE_FAULT("the affine transform");
     if (!affine_usable(header->affine)) return LATHE_ERR_FORMAT;
-    *fault = "the number of parameters";
+    *fault = LATHE_FAULT("the number of parameters");
     if (header->parameter_count > LATHE_MAX_PARAMETERS) return LATHE_ERR_FORMAT;
-    *fault = "the number of structures";
+    *fault = LATHE_FAULT("the number of structures");
     if (header->structure_count < 1 || header->structure_count > LATHE_MAX_STRUCTURES) return LATHE_ERR_FORMAT;
     lathe_status status = LATHE_OK;
     for (uint32_t i = 0; i < header->structure_count && !status; i++)
@@ -156,12 +156,12 @@ static void parse_structures(lathe_header *header, lathe_reader *body) {
     if (body->status) return;
     if (header->structure_count > LATHE_MAX_STRUCTURES ||
         header->structure_count > lathe__reader_left(body) / LATHE_STRUCTURE_MIN_BYTES) {
-        lathe__reader_fail(body, LATHE_ERR_FORMAT, "more structures than the header has room for");
+        lathe__reader_fail(body, LATHE_ERR_FORMAT, LATHE_FAULT("more structures than the header has room for"));
         return;
     }
     header->structures = malloc((size_t)header->structure_count * sizeof *header->structures + 1);
     if (!header->structures) {
-        lathe__reader_fail(body, LATHE_ERR_MEMORY, "out of memory");
+        lathe__reader_fail(body, LATHE_ERR_MEMORY, LATHE_FAULT("out of memory"));
         return;
     }
     static const lathe_header_structure before = {.level_count = 0};
@@ -174,18 +174,18 @@ static void parse_structures(lathe_header *header, lathe_reader *body) {
 
 static void parse_body(lathe_header *header, lathe_reader *body) {
     uint8_t flags = lathe__read_u8(body);
-    if (flags & 0xF0) lathe__reader_fail(body, LATHE_ERR_FORMAT, "unknown header flags");
+    if (flags & 0xF0) lathe__reader_fail(body, LATHE_ERR_FORMAT, LATHE_FAULT("unknown header flags"));
     header->axis = (lathe_axis)(flags & 3);
     header->boundary = (lathe_boundary)(flags >> 2 & 1);
     parse_affine(header->affine, body, flags >> 3 & 1);
     header->parameter_count = lathe__read_u8(body);
     if (header->parameter_count > LATHE_MAX_PARAMETERS)
-        lathe__reader_fail(body, LATHE_ERR_FORMAT, "too many parameters");
+        lathe__reader_fail(body, LATHE_ERR_FORMAT, LATHE_FAULT("too many parameters"));
     for (uint32_t i = 0; i < header->parameter_count && !body->status; i++)
         header->parameters[i] = lathe__read_varint(body);
     parse_structures(header, body);
     if (!body->status && body->at != body->end)
-        lathe__reader_fail(body, LATHE_ERR_FORMAT, "bytes left over in the header");
+        lathe__reader_fail(body, LATHE_ERR_FORMAT, LATHE_FAULT("bytes left over in the header"));
     if (body->status == LATHE_MORE) { /* the record said that this is all */
         body->status = LATHE_ERR_FORMAT;
         body->fault = "the header ends early";
@@ -206,9 +206,9 @@ static void parse_magic(lathe_reader *reader) {
     if (common == LATHE_MAGIC_SIZE || common == there) {
         (void)lathe__read_bytes(reader, LATHE_MAGIC_SIZE);
     } else if (common == LATHE_MAGIC_SIZE - 1) {
-        lathe__reader_fail(reader, LATHE_ERR_UNSUPPORTED, "a Lathe archive of another version");
+        lathe__reader_fail(reader, LATHE_ERR_UNSUPPORTED, LATHE_FAULT("a Lathe archive of another version"));
     } else {
-        lathe__reader_fail(reader, LATHE_ERR_FORMAT, "not a Lathe archive");
+        lathe__reader_fail(reader, LATHE_ERR_FORMAT, LATHE_FAULT("not a Lathe archive"));
     }
 }
 
@@ -217,14 +217,14 @@ lathe_status lathe__header_parse(lathe_header *out, lathe_reader *reader) {
     parse_magic(reader);
     uint32_t size = lathe__read_varint(reader);
     if (!reader->status && size > LATHE_MAX_HEADER_BYTES)
-        lathe__reader_fail(reader, LATHE_ERR_LIMIT, "the header is too large");
+        lathe__reader_fail(reader, LATHE_ERR_LIMIT, LATHE_FAULT("the header is too large"));
     size_t there = lathe__reader_left(reader);
     if (!reader->status && there < (size_t)size + LATHE_CRC_SIZE) {
         reader->lacking = (size_t)size + LATHE_CRC_SIZE - there;
-        lathe__reader_fail(reader, LATHE_MORE, "the header is not complete");
+        lathe__reader_fail(reader, LATHE_MORE, LATHE_FAULT("the header is not complete"));
     }
     const uint8_t *bytes = lathe__read_bytes(reader, size);
-    read_checksum(reader, start, "the header's checksum does not match");
+    read_checksum(reader, start, LATHE_FAULT("the header's checksum does not match"));
     if (reader->status) return reader->status;
     lathe_header header;
     memset(&header, 0, sizeof header);
@@ -257,16 +257,16 @@ static void parse_sizes(lathe_level_head *head, lathe_reader *reader) {
     size_t least = (size_t)head->count + LATHE_CRC_SIZE, there = lathe__reader_left(reader);
     if (there < least) {
         reader->lacking = least - there;
-        lathe__reader_fail(reader, LATHE_MORE, "the level record is not complete");
+        lathe__reader_fail(reader, LATHE_MORE, LATHE_FAULT("the level record is not complete"));
         return;
     }
     head->sizes = malloc((size_t)head->count * sizeof *head->sizes + 1);
-    if (!head->sizes) lathe__reader_fail(reader, LATHE_ERR_MEMORY, "out of memory");
+    if (!head->sizes) lathe__reader_fail(reader, LATHE_ERR_MEMORY, LATHE_FAULT("out of memory"));
     for (uint32_t i = 0; i < head->count && !reader->status; i++) {
         head->sizes[i] = lathe__read_varint(reader);
         head->body_bytes += (uint64_t)head->sizes[i] + LATHE_CRC_SIZE;
         if (head->sizes[i] > LATHE_MAX_PACKET_BYTES)
-            lathe__reader_fail(reader, LATHE_ERR_LIMIT, "a packet is too large");
+            lathe__reader_fail(reader, LATHE_ERR_LIMIT, LATHE_FAULT("a packet is too large"));
         if (reader->status == LATHE_MORE) reader->lacking = head->count - i + LATHE_CRC_SIZE;
     }
 }
@@ -277,19 +277,19 @@ lathe_status lathe__level_parse(lathe_level_head *out, lathe_reader *reader, con
     memset(&head, 0, sizeof head);
     uint8_t tag = lathe__read_u8(reader);
     if (!reader->status && tag != LATHE_LEVEL_TAG)
-        lathe__reader_fail(reader, LATHE_ERR_FORMAT, "no level record where one must be");
+        lathe__reader_fail(reader, LATHE_ERR_FORMAT, LATHE_FAULT("no level record where one must be"));
     head.level = lathe__read_varint(reader);
     if (!reader->status && head.level >= header->level_count)
-        lathe__reader_fail(reader, LATHE_ERR_FORMAT, "the number of a level");
+        lathe__reader_fail(reader, LATHE_ERR_FORMAT, LATHE_FAULT("the number of a level"));
     head.error_rms_mm = lathe__read_f32(reader);
     head.error_max_mm = lathe__read_f32(reader);
     head.count = lathe__read_varint(reader);
     if (!reader->status && (!error_usable(head.error_rms_mm) || !error_usable(head.error_max_mm)))
-        lathe__reader_fail(reader, LATHE_ERR_FORMAT, "the error of a level");
+        lathe__reader_fail(reader, LATHE_ERR_FORMAT, LATHE_FAULT("the error of a level"));
     if (!reader->status && head.count != lathe__header_present(header, head.level))
-        lathe__reader_fail(reader, LATHE_ERR_FORMAT, "the number of packets of a level");
+        lathe__reader_fail(reader, LATHE_ERR_FORMAT, LATHE_FAULT("the number of packets of a level"));
     if (!reader->status) parse_sizes(&head, reader);
-    read_checksum(reader, start, "the checksum of a level record does not match");
+    read_checksum(reader, start, LATHE_FAULT("the checksum of a level record does not match"));
     if (reader->status) {
         lathe__level_head_free(&head);
         return reader->status;
@@ -307,10 +307,10 @@ const uint8_t *lathe__packet_parse(lathe_reader *reader, uint32_t size) {
     size_t there = lathe__reader_left(reader);
     if (!reader->status && there < (size_t)size + LATHE_CRC_SIZE) {
         reader->lacking = (size_t)size + LATHE_CRC_SIZE - there;
-        lathe__reader_fail(reader, LATHE_MORE, "the packet is not complete");
+        lathe__reader_fail(reader, LATHE_MORE, LATHE_FAULT("the packet is not complete"));
     }
     const uint8_t *payload = lathe__read_bytes(reader, size);
     if (!payload) return NULL;
-    read_checksum(reader, payload, "a packet's checksum does not match");
+    read_checksum(reader, payload, LATHE_FAULT("a packet's checksum does not match"));
     return reader->status ? NULL : payload;
 }

@@ -1,6 +1,7 @@
 /* Rays choose the base shape: on each ray the outermost crossing, averaged over the neighbouring directions that no ray is cast in. */
 #include <stdlib.h>
 #include <string.h>
+#include "centre.h"
 #include "base_shape.h"
 
 enum { FINER = 4 };            /* directions looked at for each ray */

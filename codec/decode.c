@@ -112,7 +112,7 @@ static lathe_status next_packet(lathe_decoder *d, const uint8_t **payload, uint3
         lathe_status status = lathe__header_parse(&d->header, &reader);
         if (status) return reading(d, &reader, status);
         status = start_structures(d);
-        if (status) return fail(d, status, "header");
+        if (status) return fail(d, status, LATHE_FAULT("header"));
         d->has_header = true;
         d->used = (size_t)(reader.at - d->bytes);
     }
@@ -140,7 +140,7 @@ lathe_status lathe_decoder_step(lathe_decoder *d, lathe_step *step) {
     while (d->header.structures[d->next_structure].level_count <= d->head.level) d->next_structure++;
     uint32_t s = d->next_structure++;
     lathe_structure_state *state = &d->states[s];
-    const char *fault = "";
+    const char *fault = LATHE_FAULT("");
     status = lathe__structure_decode(state, &d->arena[0], &d->trained, d->head.level, payload, size, &fault);
     lathe__arena_reset(&d->arena[0]);
     if (status) return fail(d, status, fault);
@@ -167,7 +167,7 @@ const lathe_mesh *lathe_decoder_mesh(lathe_decoder *d, uint32_t structure) {
     d->mesh_level = -1;
     lathe_status status = lathe__state_mesh(&d->mesh, d->arena, &d->states[structure], &d->counts, &d->shown);
     if (status) {
-        fail(d, status, "the surface cannot be built");
+        fail(d, status, LATHE_FAULT("the surface cannot be built"));
         return NULL;
     }
     d->mesh_of = structure;
@@ -181,4 +181,7 @@ const lathe_transform *lathe_decoder_transform(const lathe_decoder *d, uint32_t 
 
 uint32_t lathe_decoder_structures(const lathe_decoder *d) { return d->has_header ? d->header.structure_count : 0; }
 
-const char *lathe_decoder_error(const lathe_decoder *d) { return d->failure ? d->fault : ""; }
+const char *lathe_decoder_error(const lathe_decoder *d) {
+    if (!d->failure) return "";
+    return *d->fault ? d->fault : lathe_status_name(d->failure);
+}

@@ -14,7 +14,7 @@ static bool stars_fit(const lathe_structure_state *state, uint32_t count) {
 
 static lathe_status decode_base(lathe_structure_state *state, lathe_reader *reader, const char **fault) {
     uint32_t kept = lathe__read_varint(reader), count;
-    *fault = "base shape: list of kept slices";
+    *fault = LATHE_FAULT("base shape: list of kept slices");
     if (reader->status || kept > (uint32_t)state->plan.slices || kept > lathe__reader_left(reader)) return LATHE_ERR_FORMAT;
     int32_t *list = calloc(kept + 1, sizeof *list);
     if (!list) return LATHE_ERR_MEMORY;
@@ -33,7 +33,7 @@ static lathe_status decode_base(lathe_structure_state *state, lathe_reader *read
     if (!state->base) return LATHE_ERR_MEMORY;
     lathe_range_decoder d;
     lathe__decoder_start(&d, reader->at, lathe__reader_left(reader));
-    *fault = "base shape: stars";
+    *fault = LATHE_FAULT("base shape: stars");
     status = lathe__base_decode(state->base, count, &state->arena, &d, &state->mask);
     if (!status && !stars_fit(state, count)) status = LATHE_ERR_FORMAT;
     return status;
@@ -57,7 +57,7 @@ static lathe_status decode_slices(lathe_structure_state *state, lathe_arena *scr
     for (uint32_t i = 0; !status && i < count; i++) {
         status = lathe__occupancy_decode(state->occupancy, &d, lathe__mask_slice(&state->mask, list[i].slice), &list[i].known);
         if (d.overrun > 8) {
-            *fault = "occupancy: the packet ends before its slices";
+            *fault = LATHE_FAULT("occupancy: the packet ends before its slices");
             status = LATHE_ERR_FORMAT;
         }
     }
@@ -68,14 +68,14 @@ static lathe_status decode_slices(lathe_structure_state *state, lathe_arena *scr
 
 lathe_status lathe__structure_decode(lathe_structure_state *state, lathe_arena *scratch, lathe_occupancy **trained, uint32_t level,
                                      const uint8_t *payload, size_t size, const char **fault) {
-    *fault = "levels out of order";
+    *fault = LATHE_FAULT("levels out of order");
     if (state->level + 1 != (int32_t)level || level >= state->plan.level_count) return LATHE_ERR_FORMAT;
     lathe_status status;
     if (level == 0) {
         lathe_reader reader = lathe__reader(payload, size);
         status = decode_base(state, &reader, fault);
     } else {
-        *fault = "occupancy";
+        *fault = LATHE_FAULT("occupancy");
         status = decode_slices(state, scratch, trained, level, payload, size, fault);
     }
     if (!status) state->level = (int32_t)level;

@@ -59,10 +59,6 @@ int lathe__compare_fractions(uint64_t a, uint64_t b, uint64_t c, uint64_t d);
 lathe_status lathe__cast_rays(lathe_crossing **out, uint32_t *count, lathe_arena *arena, const lathe_point *points,
                               uint32_t point_count, lathe_point centre, uint32_t rays);
 
-/* centre.c: where the rays of a loop start: halves the area it encloses in x and in y, and lies inside [M 3.1]; scratch from the
- * arena. For a hole it is that of the hole. */
-lathe_status lathe__loop_centre(lathe_point *out, lathe_arena *arena, const lathe_point *points, uint32_t count);
-
 /* contour.c: edge types [M definition 1 as repaired]: edge i joins crossing i to crossing i + 1 (cyclic). */
 typedef enum lathe_edge_type { LATHE_FOR, LATHE_BACK, LATHE_UP_I, LATHE_UP_O, LATHE_DOWN_I, LATHE_DOWN_O } lathe_edge_type;
 /* types: count bytes (lathe_edge_type). RANGE if two neighbouring crossings are on rays more than one apart. */

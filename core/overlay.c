@@ -15,6 +15,11 @@
 #include <string.h>
 
 enum { NONE = 0xffffffffu };
+#ifdef LATHE_SMALL
+enum { COUNTED = 0 };          /* nobody asks a small decoder how its joints turned out */
+#else
+enum { COUNTED = 1 };
+#endif
 
 typedef struct cycle {
     uint32_t first, count;     /* its nodes */
@@ -113,7 +118,7 @@ static lathe_status test_edges(overlay *o, uint32_t a, uint32_t b) {
     if ((d1 > 0) == (d2 > 0)) return LATHE_OK;
     int64_t e1 = lathe__turn(o->at, b, b1, a), e2 = lathe__turn(o->at, b, b1, a1);
     if ((e1 > 0) == (e2 > 0)) return LATHE_OK;
-    if (!d1 || !d2 || !e1 || !e2) o->counts->contacts++;
+    if (COUNTED && (!d1 || !d2 || !e1 || !e2)) o->counts->contacts++;
     return add_meeting(o, a, b, d1, d2, e1, e2);
 }
 
@@ -408,7 +413,7 @@ static lathe_status link_loops(overlay *o) {
     for (uint32_t m = 0; m < o->meeting_count; m++)
         unite(o->block, o->loop[o->meetings[m].edge[0]], o->loop[o->meetings[m].edge[1]]);
     for (uint32_t i = 0; i < loops; i++) members[find(o->block, i) * 2 + (i >= o->loops0)]++;
-    for (uint32_t i = 0; i < loops; i++) {
+    for (uint32_t i = 0; COUNTED && i < loops; i++) {
         uint32_t a = members[i * 2], b = members[i * 2 + 1];
         if (a + b) o->counts->links[a + b == 1 || !a || !b ? 0 : a == 1 && b == 1 ? 1 : a == 1 || b == 1 ? 2 : 3]++;
     }
@@ -537,7 +542,7 @@ static bool fill_strip(overlay *o, int p, strip *s, uint32_t ends) {
     if (tube) {
         s->target = tree_targets(o, tube, s, ends, s->m, ends, !ends, side_of(o, s->p[ends]) != p);
         if (s->target && merge_strip(o, p, s, ends)) {
-            o->counts->tree_strips++;
+            o->counts->tree_strips += COUNTED;
             return true;
         }
         s->target = NULL;
@@ -638,8 +643,7 @@ static lathe_status triangulate_cell(overlay *o, uint32_t id) {
         polygon.ring_end[rings++] = total;
     }
     bool single = sides == 1 || sides == 2;
-    if (single) o->counts->single_cells++;
-    else o->counts->other_cells++;
+    if (COUNTED) ++*(single ? &o->counts->single_cells : &o->counts->other_cells);
     uint32_t(*t)[3], *neighbour, count;
     lathe_status status = lathe__triangulate(&t, &neighbour, &count, o->arena, &polygon);
     if (status) return status;
@@ -690,7 +694,7 @@ static lathe_status tile_cell(overlay *o, uint32_t id) {
                side_of(o, o->nodes[c->first]) != side_of(o, o->nodes[hole->first])) {
         done = try_ring_strip(o, c, hole);
     }
-    o->counts->strips += done;
+    o->counts->strips += done * COUNTED;
     return done ? LATHE_OK : triangulate_cell(o, id);
 }
 
@@ -716,7 +720,7 @@ lathe_status lathe__overlay_slab(lathe_mesh_builder *builder, lathe_arena *arena
     static lathe_status (*const step[])(overlay *) = {find_meetings, place_meetings, order_meetings, mark_inside, find_cycles};
     for (size_t i = 0; i < sizeof step / sizeof *step; i++)
         if ((status = step[i](&o)) != LATHE_OK) return status;
-    counts->crossings += o.meeting_count;
+    counts->crossings += o.meeting_count * COUNTED;
     group_cells(&o);
     if ((status = link_loops(&o)) != LATHE_OK) return status;
     for (uint32_t i = 0; i < o.cycle_count; i++)

@@ -2,6 +2,7 @@
  * crosses itself, a neighbour, or steps over a small loop [M figure 6]; the cure is that of Ho, Kim & Kim: the piece of loop that
  * an offending edge stands for is expanded at its farthest vertex, until nothing offends. Whole loops are simple, so it ends. */
 #include <string.h>
+#include "centre.h"
 #include "grid.h"
 #include "level.h"
 

@@ -1,5 +1,6 @@
 /* One-to-one links: both loops are cast with the same rays, each from its own centre; their contours' trees are walked together. */
 #include <string.h>
+#include "centre.h"
 #include "level.h"
 #include "overlay.h"
 
