@@ -117,3 +117,9 @@ void lathe__emit_level_head(lathe_bytes *bytes, const lathe_level_head *head) {
     for (uint32_t i = 0; i < head->count; i++) lathe__emit_varint(bytes, head->sizes[i]);
     lathe__emit_checksum(bytes, start);
 }
+
+int lathe__count_bytes(void *context, const void *bytes, size_t size) {
+    (void)bytes;
+    *(uint64_t *)context += size;
+    return 0;
+}

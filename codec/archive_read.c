@@ -381,15 +381,9 @@ lathe_status lathe_model_stream(const lathe_model *model, int64_t structure, uin
     return size && sink(context, model->bytes + offset, size) ? LATHE_ERR_IO : LATHE_OK;
 }
 
-static int count_bytes(void *context, const void *bytes, size_t size) {
-    (void)bytes;
-    *(uint64_t *)context += size;
-    return 0;
-}
-
 uint64_t lathe_model_stream_size(const lathe_model *model, int64_t structure, uint32_t from, uint32_t to) {
     uint64_t sum = 0;
-    return lathe_model_stream(model, structure, from, to, count_bytes, &sum) ? 0 : sum;
+    return lathe_model_stream(model, structure, from, to, lathe__count_bytes, &sum) ? 0 : sum;
 }
 
 static lathe_status check_level(const lathe_model *model, uint32_t level, lathe_error *err) {

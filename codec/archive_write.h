@@ -25,6 +25,9 @@ void lathe__emit_checksum(lathe_bytes *bytes, size_t start);
 void lathe__emit_header(lathe_bytes *bytes, const lathe_header *header, uint32_t first, uint32_t count);
 void lathe__emit_level_head(lathe_bytes *bytes, const lathe_level_head *head);
 
+/* A lathe_sink that only counts: context is a uint64_t. */
+int lathe__count_bytes(void *context, const void *bytes, size_t size);
+
 /* ---- archive_names.c: name, colour and label of a structure, coded against the one before (the first: a zeroed one) ---- */
 void lathe__emit_identity(lathe_bytes *bytes, const lathe_header_structure *s, const lathe_header_structure *previous);
 /* FORMAT in the reader if the name is empty, not UTF-8, or has control characters. */

@@ -94,12 +94,6 @@ static size_t sample_count(const bake *b, const lathe_mask *mask) {
     return n < 400 ? 400 : n > 20000 ? 20000 : n;
 }
 
-static int count_bytes(void *context, const void *bytes, size_t size) {
-    (void)bytes;
-    *(uint64_t *)context += size;
-    return 0;
-}
-
 static lathe_status draco_size(uint64_t *out, const lathe_mesh *mesh, const lathe_transform *transform) {
     struct lathe_world_part part = {0, 0, mesh->vertex_count, 0, mesh->triangle_count};
     lathe_world_mesh world = {.vertex_count = mesh->vertex_count, .triangle_count = mesh->triangle_count, .structure_count = 1, .parts = &part};
@@ -110,7 +104,7 @@ static lathe_status draco_size(uint64_t *out, const lathe_mesh *mesh, const lath
         lathe_mesh_positions(mesh, transform, world.positions);
         lathe_mesh_indices(mesh, transform, world.indices);
         *out = 0;
-        status = lathe_write_drc(&world, 0, count_bytes, out);
+        status = lathe_write_drc(&world, 0, lathe__count_bytes, out);
     }
     free(world.positions);
     free(world.indices);

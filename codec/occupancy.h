@@ -9,7 +9,6 @@
 typedef struct lathe_known {
     const uint64_t *below, *above;      /* nearest known slices on either side */
     int32_t gap_below, gap_above;
-    const uint64_t *below2, *above2;    /* the next ones beyond them, or NULL: not used now */
 } lathe_known;
 
 typedef struct lathe_occupancy lathe_occupancy;    /* adaptive state; one per structure, kept over its levels */

@@ -357,12 +357,12 @@ static int say(void *coder, uint32_t p1, int bit) {
 
 static void code_blob(lathe_occupancy *s, uint64_t bits[BLOB_SLICES][BLOB]) {
     for (int32_t w = 0; w < BLOB_SLICES; w += 8) {
-        lathe_known known = {w ? bits[w - 8] : NULL, NULL, 8, 0, NULL, NULL};
+        lathe_known known = {w ? bits[w - 8] : NULL, NULL, 8, 0};
         lathe__occupancy_walk(s, &(lathe_bit_coder){say, NULL, bits[w]}, NULL, &known);
     }
     for (int32_t gap = 4; gap >= 1; gap /= 2)
         for (int32_t w = gap; w < BLOB_SLICES; w += 2 * gap) {
-            lathe_known known = {bits[w - gap], bits[w + gap], gap, gap, NULL, NULL};
+            lathe_known known = {bits[w - gap], bits[w + gap], gap, gap};
             lathe__occupancy_walk(s, &(lathe_bit_coder){say, NULL, bits[w]}, NULL, &known);
         }
 }

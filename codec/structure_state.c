@@ -39,12 +39,11 @@ lathe_status lathe__new_slices(lathe_new_slice **out, uint32_t *count, lathe_are
         lathe_new_slice *s = &list[n++];
         *s = (lathe_new_slice){.slice = now[i]};
         if (i > 0) { s->known.below = lathe__mask_slice(&state->mask, now[i - 1]); s->known.gap_below = now[i] - now[i - 1]; }
-        if (i > 1) s->known.below2 = lathe__mask_slice(&state->mask, now[i - 2]);
-        uint32_t above = 0;
-        for (uint32_t k = i + 1; k < now_count && above < 2; k++) {
+        for (uint32_t k = i + 1; k < now_count; k++) {
             if (!contains(before, before_count, now[k])) continue;
-            if (above++) s->known.above2 = lathe__mask_slice(&state->mask, now[k]);
-            else { s->known.above = lathe__mask_slice(&state->mask, now[k]); s->known.gap_above = now[k] - now[i]; }
+            s->known.above = lathe__mask_slice(&state->mask, now[k]);
+            s->known.gap_above = now[k] - now[i];
+            break;
         }
     }
     *out = list;

@@ -37,7 +37,7 @@ lathe_point lathe__jitter(lathe_point p, uint32_t seed);
 typedef struct lathe_surface_counts {
     lathe_overlay_counts overlay;
     uint32_t rays;             /* most rays of any loop */
-    uint64_t contour_vertices, unfolded;   /* vertices of all contours; those added to keep contours simple */
+    uint64_t contour_vertices; /* vertices of all contours */
 } lathe_surface_counts;
 
 /* Closes a stack of outlines: slab by slab, air below the first and above the last. heights: slice numbers. */

@@ -61,10 +61,7 @@ static void visit_levels(const stack *s, int32_t gap, visit *see, void *context)
             int32_t b = w - 1, a = w + 1;
             while (b >= 0 && !have[b]) b--;
             while (a < s->count && !have[a]) a++;
-            int32_t b2 = b - 1, a2 = a + 1;
-            while (b2 >= 0 && !have[b2]) b2--;
-            while (a2 < s->count && !have[a2]) a2++;
-            lathe_known known = {slice(s, b), slice(s, a), w - b, a - w, slice(s, b2), slice(s, a2)};
+            lathe_known known = {slice(s, b), slice(s, a), w - b, a - w};
             see(context, s, w, &known);
             have[w] = true;
         }
