@@ -20,7 +20,7 @@ PARALLEL = $(if $(filter -j% --jobserver%,$(MAKEFLAGS)),,-j$(shell nproc 2>/dev/
 
 # ---- sources: found by wildcard, but for the decoder that becomes wasm -------------------------------------------------
 
-CORE := $(wildcard core/*.c)
+CORE := $(wildcard core/*.c core/sections/*.c)
 CODEC := $(filter-out codec/wasm_exports.c,$(wildcard codec/*.c))
 CODEC_CXX := $(wildcard codec/*.cc)
 SERVER := $(filter-out server/main.c,$(wildcard server/*.c))
@@ -55,7 +55,7 @@ endif
 
 WARNINGS := -Wall -Wextra -Werror
 # No contraction of a*b+c: every platform computes the same positions.
-COMMON = $(OPTIMISE) $(WARNINGS) -ffp-contract=off -D_GNU_SOURCE -Icore -Icodec -Iserver -Itests -I/usr/include/nifti -MMD -MP
+COMMON = $(OPTIMISE) $(WARNINGS) -ffp-contract=off -D_GNU_SOURCE -Icore -Icore/sections -Icodec -Iserver -Itests -I/usr/include/nifti -MMD -MP
 ALL_CFLAGS = -std=c11 $(COMMON) $(CFLAGS)
 ALL_CXXFLAGS = -std=c++17 $(COMMON) $(CXXFLAGS)
 LIBS := -Wl,--as-needed -lmicrohttpd -ljansson -ldraco -lnifti2 -lznz -lz -lbrotlienc -lpthread -lm
@@ -186,7 +186,7 @@ $(CHECKS:%=$(B)/tests/%): $(B)/tests/%: $(B)/tests/%.o
 
 # ---- housekeeping ------------------------------------------------------------------------------------------------------
 
-OURS := $(wildcard core/*.[ch] codec/*.[ch] codec/*.cc server/*.[ch] tests/*.[ch] tests/*.cpp web/wasm/*.[ch])
+OURS := $(wildcard core/*.[ch] core/sections/*.[ch] codec/*.[ch] codec/*.cc server/*.[ch] tests/*.[ch] tests/*.cpp web/wasm/*.[ch])
 
 .PHONY: deps format lint help clean FORCE
 deps: ## install what building and testing need (Debian packages, npm packages)
@@ -195,9 +195,9 @@ deps: ## install what building and testing need (Debian packages, npm packages)
 format: ## clang-format every C and C++ file
 	clang-format -i $(OURS)
 lint: ## clang-tidy, and the sources compiled by clang with every warning we use
-	clang-tidy --quiet $(CORE) $(CODEC) $(SERVER) server/main.c -- -std=c11 -D_GNU_SOURCE -Icore -Icodec -Iserver -I/usr/include/nifti
+	clang-tidy --quiet $(CORE) $(CODEC) $(SERVER) server/main.c -- -std=c11 -D_GNU_SOURCE -Icore -Icore/sections -Icodec -Iserver -I/usr/include/nifti
 	@for f in $(CORE) $(CODEC) $(SERVER) server/main.c; do \
-	    $(CLANG) -std=c11 -Wall -Wextra -Werror -D_GNU_SOURCE -Icore -Icodec -Iserver -I/usr/include/nifti -fsyntax-only $$f || exit 1; done
+	    $(CLANG) -std=c11 -Wall -Wextra -Werror -D_GNU_SOURCE -Icore -Icore/sections -Icodec -Iserver -I/usr/include/nifti -fsyntax-only $$f || exit 1; done
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -209,4 +209,4 @@ clean: ## remove build/ and web/dist/
 FORCE:
 .SECONDARY:
 .DELETE_ON_ERROR:
--include $(wildcard $(B)/*/*.d $(B)/*/*/*.d build/wasm/*/*.d build/wasm/*/*/*.d)
+-include $(wildcard $(B)/*/*.d $(B)/*/*/*.d $(B)/*/*/*/*.d build/wasm/*/*.d build/wasm/*/*/*.d)
