@@ -33,6 +33,9 @@ static inline void lathe__bit_learn(lathe_bit_model *m, int bit) {
     int32_t p = m->p1 + (bit ? 65535 - m->p1 : -(int32_t)m->p1) / rate;
     m->p1 = (uint16_t)(p < 512 ? 512 : p > 65023 ? 65023 : p);
 }
+/* A number of under 2^20 in magnitude: is it 0; its sign; the length of its magnitude in unary; its lower bits. */
+void lathe__put_number(lathe_range_encoder *e, lathe_number_model *m, int32_t v);
+int32_t lathe__get_number(lathe_range_decoder *d, lathe_number_model *m);
 /* Contexts of a base shape's numbers. */
 enum {
     LATHE_BASE_LOOPS, LATHE_BASE_PARENT, LATHE_BASE_HOLE, LATHE_BASE_RAYS, LATHE_BASE_CENTRE_NEW, LATHE_BASE_CENTRE,

@@ -1,0 +1,73 @@
+/* The surface of a radius map. Rays keep their directions from row to row (or turn evenly), so that a strip's triangles lie in
+ * wedges about the line of centres that do not overlap: the surface cannot cross itself. */
+#include <stdlib.h>
+#include "radius_map.h"
+
+static int64_t squared(const int32_t *a, const int32_t *b) {
+    int64_t x = a[0] - b[0], y = a[1] - b[1];
+    return x * x + y * y;
+}
+
+static void place_row(lathe_mesh *mesh, const lathe_radius_map *map, int32_t row, uint32_t stride) {
+    const int32_t *radius = map->radius + (size_t)row * map->rays;
+    uint32_t turn = (uint32_t)map->turn * (uint32_t)row;
+    for (uint32_t i = 0; i < map->rays; i += stride) {
+        lathe_point d = lathe__ray_direction((i * (65536 / map->rays) + turn) & 65535, 65536);
+        int32_t *v = mesh->lattice[mesh->vertex_count++];
+        int64_t length = (int64_t)radius[i] * (LATHE_LATTICE_ONE / LATHE_RADIUS_ONE);
+        v[0] = map->centre[row][0] * (LATHE_LATTICE_ONE / 2) + (int32_t)(length * d.x / LATHE_RAY_LENGTH);
+        v[1] = map->centre[row][1] * (LATHE_LATTICE_ONE / 2) + (int32_t)(length * d.y / LATHE_RAY_LENGTH);
+        v[2] = row * LATHE_LATTICE_ONE;
+    }
+}
+
+static void add(lathe_mesh *mesh, uint32_t a, uint32_t b, uint32_t c) {
+    uint32_t *t = mesh->triangles[mesh->triangle_count++];
+    t[0] = a, t[1] = b, t[2] = c;
+}
+
+static void add_strip(lathe_mesh *mesh, uint32_t lower, uint32_t upper, uint32_t rays) {
+    for (uint32_t i = 0; i < rays; i++) {
+        uint32_t k = i + 1 < rays ? i + 1 : 0, a = lower + i, b = lower + k, c = upper + k, d = upper + i;
+        if (squared(mesh->lattice[a], mesh->lattice[c]) <= squared(mesh->lattice[b], mesh->lattice[d])) {
+            add(mesh, a, b, c);
+            add(mesh, a, c, d);
+        } else {
+            add(mesh, a, b, d);
+            add(mesh, b, c, d);
+        }
+    }
+}
+
+/* side 0: below the first row, 1: above the last. */
+static void add_cap(lathe_mesh *mesh, const lathe_radius_map *map, int side, uint32_t first, uint32_t rays) {
+    uint32_t apex = mesh->vertex_count++;
+    int32_t row = side ? map->slices - 1 : 0, *v = mesh->lattice[apex];
+    for (int k = 0; k < 2; k++) v[k] = map->centre[row][k] * (LATHE_LATTICE_ONE / 2);
+    v[2] = row * LATHE_LATTICE_ONE + (side ? 1 : -1) * map->apex[side] * (LATHE_LATTICE_ONE / LATHE_APEX_ONE);
+    for (uint32_t i = 0; i < rays; i++) {
+        uint32_t a = first + i, b = first + (i + 1 < rays ? i + 1 : 0);
+        add(mesh, apex, side ? a : b, side ? b : a);
+    }
+}
+
+lathe_status lathe__radius_mesh(lathe_mesh *out, const lathe_radius_map *map, uint32_t level) {
+    int32_t stride = (int32_t)1 << (map->level_count - 1 - level), last = map->slices - 1;
+    uint32_t ray_stride = lathe__radius_ray_stride(map, level), rays = map->rays / ray_stride;
+    size_t rows = (size_t)((last + stride - 1) / stride) + 1, vertices = rows * rays + 2, triangles = rows * rays * 2;
+    lathe_mesh mesh = {.lattice = malloc(vertices * sizeof *mesh.lattice), .triangles = malloc(triangles * sizeof *mesh.triangles)};
+    if (!mesh.lattice || !mesh.triangles) {
+        lathe_mesh_free(&mesh);
+        return LATHE_ERR_MEMORY;
+    }
+    for (int32_t row = 0;; row = row + stride < last ? row + stride : last) {
+        place_row(&mesh, map, row, ray_stride);
+        if (row) add_strip(&mesh, mesh.vertex_count - 2 * rays, mesh.vertex_count - rays, rays);
+        if (row == last) break;
+    }
+    uint32_t top = mesh.vertex_count - rays;
+    add_cap(&mesh, map, 0, 0, rays);
+    add_cap(&mesh, map, 1, top, rays);
+    *out = mesh;
+    return LATHE_OK;
+}
