@@ -170,6 +170,15 @@ bench: ## measure the figures of the README (needs python3-vtk9); prints the tab
 	@$(MAKE) --no-print-directory $(PARALLEL) all config=release
 	@tests/bench/bench.py
 
+# Programs that print one table of the papers each.
+TABLES := $(basename $(notdir $(wildcard tests/bench/*.c)))
+.PHONY: tables
+tables: $(TABLES:%=$(B)/tests/bench/%) ## measure the papers' tables again: docs/TABLES.md
+	@tests/bench/tables.sh $(B)/tests/bench docs/TABLES.md
+$(TABLES:%=$(B)/tests/bench/%): $(B)/tests/bench/%: $(B)/tests/bench/%.o $(LIBRARY)
+	@echo "  link  $@"
+	$(Q)$(CXX) $(LINK_MODE) $(LDFLAGS) -o $@ $^ $(LIBS)
+
 TEST_HELPERS := $(patsubst %.c,$(B)/%.o,$(wildcard tests/phantom.c))
 $(UNIT_TESTS:%=$(B)/tests/%): $(B)/tests/%: $(B)/tests/%.o $(TEST_HELPERS) $(SERVER_LIBRARY) $(LIBRARY)
 	@echo "  link  $@"

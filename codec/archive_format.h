@@ -12,7 +12,7 @@
 #define LATHE_MAGIC_BYTES \
     { 0x89, 'L', 'T', 'H', 0x0D, 0x0A, 0x1A, LATHE_FORMAT_VERSION }
 enum {
-    LATHE_FORMAT_VERSION = 1,
+    LATHE_FORMAT_VERSION = 2,
     LATHE_LEVEL_TAG = 'L',
     LATHE_FOOTER_TAG = 'F',
     LATHE_CRC_SIZE = 4,
@@ -22,7 +22,7 @@ enum {
     LATHE_MAX_STRUCTURES = 65535,
     LATHE_MAX_PARAMETERS = 16,
     LATHE_STRUCTURE_MIN_BYTES = 7,    /* the shortest structure entry of a header */
-    LATHE_LEVEL_STATS_MIN_BYTES = 13, /* the shortest entry of a structure's level in a footer */
+    LATHE_LEVEL_STATS_MIN_BYTES = 14, /* the shortest entry of a structure's level in a footer */
     LATHE_MAX_HEADER_BYTES = 1 << 24,
     LATHE_MAX_PACKET_BYTES = 1 << 30
 };
@@ -73,6 +73,9 @@ typedef struct lathe_header_structure {
     int64_t label;       /* -1: a threshold */
     int32_t origin[3], size[3]; /* as in lathe_mask: (u, v, w), margin of one pixel in u and v */
 } lathe_header_structure;
+
+/* Bits of parameter 1; parameter 0 is the fraction of border edges. */
+enum { LATHE_FLAG_CAPS = 1, LATHE_FLAG_KEEP = 2 };
 
 typedef struct lathe_header {
     lathe_axis axis;

@@ -94,13 +94,24 @@ static void read_counts(lathe_level_info *level, lathe_reader *reader) {
 
 static bool error_usable(float v) { return v >= -1e30f && v <= 1e30f; }
 
+/* How many of the structure's components a level does not show yet, and their volume. */
+static void read_waiting(lathe_level_info *level, uint32_t components, lathe_reader *reader) {
+    level->components_waiting = lathe__read_varint(reader);
+    if (level->components_waiting) level->waiting_mm3 = (double)lathe__read_f32(reader);
+    if (level->components_waiting > components || !(level->waiting_mm3 >= 0 && level->waiting_mm3 <= 1e30))
+        lathe__reader_fail(reader, LATHE_ERR_FORMAT, "the components of a structure's level");
+    level->components = components - level->components_waiting;
+}
+
 static void read_structure_levels(lathe_level_info *levels, uint32_t count, lathe_reader *reader) {
+    uint32_t components = lathe__read_varint(reader);
     for (uint32_t i = 0; i < count && !reader->status; i++) {
         read_counts(&levels[i], reader);
         levels[i].error_rms_mm = lathe__read_f32(reader);
         levels[i].error_max_mm = lathe__read_f32(reader);
         if (!error_usable(levels[i].error_rms_mm) || !error_usable(levels[i].error_max_mm))
             lathe__reader_fail(reader, LATHE_ERR_FORMAT, "the error of a structure's level");
+        read_waiting(&levels[i], components, reader);
     }
 }
 
@@ -239,6 +250,18 @@ static void fill_polar_bytes(lathe_model *model) {
     }
 }
 
+static void sum_components(lathe_model *model) {
+    for (uint32_t level = 0; level < model->header.level_count; level++)
+        for (uint32_t i = 0; i < model->header.structure_count; i++) {
+            uint32_t last = model->structures[i].level_count - 1;
+            const lathe_level_info *from = &model->structures[i].levels[level < last ? level : last];
+            lathe_level_info *to = &model->totals[level];
+            to->components += from->components;
+            to->components_waiting += from->components_waiting;
+            to->waiting_mm3 += from->waiting_mm3;
+        }
+}
+
 static void fill_info(lathe_model *model) {
     for (uint32_t i = 0; i < model->header.structure_count; i++) {
         const lathe_header_structure *from = &model->header.structures[i];
@@ -254,7 +277,11 @@ static void fill_info(lathe_model *model) {
     model->info.structures = model->structures;
     model->info.axis = model->header.axis;
     model->info.boundary = model->header.boundary;
+    uint32_t flags = model->header.parameter_count > 1 ? model->header.parameters[1] : 0;
+    model->info.keep_topology = flags & LATHE_FLAG_KEEP;
+    model->info.caps = flags & LATHE_FLAG_CAPS;
     model->info.levels = model->totals;
+    sum_components(model);
     fill_polar_bytes(model);
 }
 

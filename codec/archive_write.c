@@ -177,6 +177,8 @@ static void emit_structure_levels(lathe_bytes *footer, const lathe_level_info *l
         emit_counts(footer, &levels[i]);
         lathe__emit_f32(footer, stored_error(levels[i].error_rms_mm));
         lathe__emit_f32(footer, stored_error(levels[i].error_max_mm));
+        lathe__emit_varint(footer, levels[i].components_waiting);
+        if (levels[i].components_waiting) lathe__emit_f32(footer, (float)levels[i].waiting_mm3);
     }
 }
 
@@ -197,7 +199,9 @@ static void emit_footer(lathe_bytes *footer, const lathe_archive_writer *writer,
     static const lathe_header_structure nobody = {.level_count = 0};
     for (uint32_t i = 0; i < header->structure_count; i++) {
         lathe__emit_identity(footer, &header->structures[i], i ? &header->structures[i - 1] : &nobody);
-        emit_structure_levels(footer, stats->structures[i], header->structures[i].level_count);
+        const lathe_level_info *first = stats->structures[i];
+        lathe__emit_varint(footer, (uint64_t)first->components + first->components_waiting);
+        emit_structure_levels(footer, first, header->structures[i].level_count);
     }
     lathe__emit_checksum(footer, 0);
 }

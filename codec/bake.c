@@ -54,6 +54,33 @@ static float value_at(const bake *b, const int32_t frame[3], int32_t u, int32_t 
     return b->volume->values[((size_t)at[2] * (size_t)b->volume->dims[1] + (size_t)at[1]) * (size_t)b->volume->dims[0] + (size_t)at[0]];
 }
 
+/* What the encoder asks: positions are of the mask's frame. */
+typedef struct grey_values { const bake *bake; const lathe_mask *mask; int32_t frame[3]; } grey_values;
+
+static double grey_value(const void *context, int32_t u, int32_t v, int32_t w) {
+    const grey_values *g = context;
+    const int32_t *o = g->mask->origin;
+    return (double)value_at(g->bake, g->frame, o[0] + u, o[1] + v, o[2] + w);
+}
+
+static double voxel_mm3(const lathe_volume *volume) {
+    const double(*m)[4] = volume->affine;
+    return fabs(m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+                m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]));
+}
+
+static lathe_status encode(bake *b, lathe_baked_structure *baked, lathe_structure_state *state) {
+    grey_values grey = {.bake = b, .mask = &state->mask};
+    lathe__axis_frame(b->options->axis, grey.frame);
+    const double *spacing = b->volume->spacing;
+    double slice = spacing[grey.frame[2]];
+    lathe_encode_source source = {.slice_ratio = slice * slice / (spacing[grey.frame[0]] * spacing[grey.frame[1]]),
+                                  .value = grey_value, .context = &grey, .iso = b->options->iso};
+    lathe_status status = lathe__structure_encode(baked, state, b->arena, &b->trained, &source);
+    for (uint32_t level = 0; level < baked->level_count; level++) baked->levels[level].waiting_mm3 *= voxel_mm3(b->volume);
+    return status;
+}
+
 /* Where the grey values cross iso on border edges, on average: one number for the whole structure. Rows and columns of every few
  * slices are enough. */
 static int mean_fraction(const bake *b, const lathe_mask *mask) {
@@ -123,9 +150,8 @@ static lathe_status finish_levels(bake *b, lathe_structure_state *state, lathe_b
         lathe_level_info *info = &baked->levels[level];
         lathe_surface_counts counts;
         lathe_mesh mesh = {0};
-        state->level = (int32_t)level;
-        *info = (lathe_level_info){.error_rms_mm = -1, .error_max_mm = -1};
-        status = lathe__state_mesh(&mesh, b->arena, state, &counts, &info->slices);
+        info->error_rms_mm = info->error_max_mm = -1;
+        status = lathe__encoded_mesh(&mesh, b->arena, state, baked, level, &counts, &info->slices);
         info->rays = counts.rays;
         info->vertices = mesh.vertex_count;
         info->triangles = mesh.triangle_count;
@@ -154,7 +180,8 @@ static lathe_status bake_structure(bake *b, size_t index) {
     if (!status) {
         state.fraction = mean_fraction(b, &state.mask);
         if (!b->options->structure_count) b->header.parameters[0] = (uint32_t)state.fraction;
-        status = lathe__structure_encode(baked, &state, b->arena, &b->trained);
+        state.flags = b->header.parameters[1];
+        status = encode(b, baked, &state);
         if (status) lathe_fail(b->err, status, "%s: encoding: %s", h->name, lathe_status_name(status));
     }
     if (!status) {
@@ -181,6 +208,9 @@ static lathe_level_info sum_levels(const bake *b, uint32_t level) {
         sum.vertices += l->vertices;
         sum.triangles += l->triangles;
         sum.draco_bytes += l->draco_bytes;
+        sum.components += l->components;
+        sum.components_waiting += l->components_waiting;
+        sum.waiting_mm3 += l->waiting_mm3;
         if (l->error_max_mm > sum.error_max_mm) sum.error_max_mm = l->error_max_mm;
         squares += (double)l->error_rms_mm * (double)l->error_rms_mm * baked->area_mm2;
         area += baked->area_mm2;
@@ -238,8 +268,10 @@ static lathe_status prepare(bake *b) {
     b->header.axis = o->axis;
     b->header.boundary = b->boundary;
     memcpy(b->header.affine, b->volume->affine, sizeof b->header.affine);
-    b->header.parameter_count = 1;
     b->header.parameters[0] = LATHE_FRACTION_ONE / 2;
+    b->header.parameters[1] = (o->keep_topology ? LATHE_FLAG_KEEP : 0) |
+                              (b->boundary == LATHE_BOUNDARY_ISO && !o->structure_count && !o->flat_caps ? LATHE_FLAG_CAPS : 0);
+    b->header.parameter_count = b->header.parameters[1] ? 2 : 1;
     b->header.structure_count = (uint32_t)b->count;
     b->header.structures = calloc(b->count, sizeof *b->header.structures);
     b->baked = calloc(b->count, sizeof *b->baked);

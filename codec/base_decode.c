@@ -1,18 +1,18 @@
 #include "base_shape.h"
 
-static int get_bit(lathe_range_decoder *d, lathe_bit_model *m) {
+int lathe__get_bit(lathe_range_decoder *d, lathe_bit_model *m) {
     int bit = lathe__decode_bit(d, m->p1);
     lathe__bit_learn(m, bit);
     return bit;
 }
 
 int32_t lathe__get_number(lathe_range_decoder *d, lathe_number_model *m) {
-    if (!get_bit(d, &m->bit[0])) return 0;
-    int negative = get_bit(d, &m->bit[1]), length = 0;
-    while (length < 20 && get_bit(d, &m->bit[2 + length])) length++;
+    if (!lathe__get_bit(d, &m->bit[0])) return 0;
+    int negative = lathe__get_bit(d, &m->bit[1]), length = 0;
+    while (length < 20 && lathe__get_bit(d, &m->bit[2 + length])) length++;
     uint32_t a = 1;
     for (int i = length - 1; i >= 0; i--)
-        a = a * 2 + (uint32_t)(i == length - 1 ? get_bit(d, &m->bit[24 + length]) : lathe__decode_bit(d, 32768));
+        a = a * 2 + (uint32_t)(i == length - 1 ? lathe__get_bit(d, &m->bit[24 + length]) : lathe__decode_bit(d, 32768));
     return negative ? -(int32_t)a : (int32_t)a;
 }
 

@@ -1,22 +1,22 @@
 #include "base_shape.h"
 
-static void put_bit(lathe_range_encoder *e, lathe_bit_model *m, int bit) {
+void lathe__put_bit(lathe_range_encoder *e, lathe_bit_model *m, int bit) {
     lathe__encode_bit(e, m->p1, bit);
     lathe__bit_learn(m, bit);
 }
 
 /* 0; else sign, then the length of the magnitude in unary, then its lower bits, the first of them modelled. */
 void lathe__put_number(lathe_range_encoder *e, lathe_number_model *m, int32_t v) {
-    put_bit(e, &m->bit[0], v != 0);
+    lathe__put_bit(e, &m->bit[0], v != 0);
     if (!v) return;
-    put_bit(e, &m->bit[1], v < 0);
+    lathe__put_bit(e, &m->bit[1], v < 0);
     uint32_t a = (uint32_t)(v < 0 ? -v : v);
     int length = 0;
     while (a >> length > 1) length++;
-    for (int i = 0; i < length; i++) put_bit(e, &m->bit[2 + i], 1);
-    put_bit(e, &m->bit[2 + length], 0);
+    for (int i = 0; i < length; i++) lathe__put_bit(e, &m->bit[2 + i], 1);
+    lathe__put_bit(e, &m->bit[2 + length], 0);
     for (int i = length - 1; i >= 0; i--)
-        if (i == length - 1) put_bit(e, &m->bit[24 + length], a >> i & 1);
+        if (i == length - 1) lathe__put_bit(e, &m->bit[24 + length], a >> i & 1);
         else lathe__encode_bit(e, 32768, a >> i & 1);
 }
 

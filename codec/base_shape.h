@@ -35,7 +35,9 @@ static inline void lathe__bit_learn(lathe_bit_model *m, int bit) {
 }
 /* A number of under 2^20 in magnitude: is it 0; its sign; the length of its magnitude in unary; its lower bits. */
 void lathe__put_number(lathe_range_encoder *e, lathe_number_model *m, int32_t v);
+int lathe__get_bit(lathe_range_decoder *d, lathe_bit_model *m);
 int32_t lathe__get_number(lathe_range_decoder *d, lathe_number_model *m);
+void lathe__put_bit(lathe_range_encoder *e, lathe_bit_model *m, int bit);
 /* Contexts of a base shape's numbers. */
 enum {
     LATHE_BASE_LOOPS, LATHE_BASE_PARENT, LATHE_BASE_HOLE, LATHE_BASE_RAYS, LATHE_BASE_CENTRE_NEW, LATHE_BASE_CENTRE,

@@ -93,6 +93,7 @@ static lathe_status start_structures(lathe_decoder *d) {
         s->mask.row_words = (h->size[0] + 63) / 64;
         s->plan = (lathe_level_plan){.slices = h->size[2], .level_count = h->level_count};
         s->fraction = d->header.parameter_count ? (int)(d->header.parameters[0] & 63) : LATHE_FRACTION_ONE / 2;
+        s->flags = d->header.parameter_count > 1 ? d->header.parameters[1] : 0;
         s->level = -1;
         d->transforms[i] = lathe__mask_transform(&s->mask, d->header.axis, d->header.affine);
     }
@@ -177,6 +178,17 @@ const lathe_mesh *lathe_decoder_mesh(lathe_decoder *d, uint32_t structure) {
 
 const lathe_transform *lathe_decoder_transform(const lathe_decoder *d, uint32_t structure) {
     return d->has_header && structure < d->header.structure_count ? &d->transforms[structure] : NULL;
+}
+
+bool lathe_decoder_voxels(const lathe_decoder *d, uint32_t structure, lathe_voxels *out) {
+    if (!d->has_header || structure >= d->header.structure_count) return false;
+    const lathe_structure_state *s = &d->states[structure];
+    *out = (lathe_voxels){.row_words = s->mask.row_words, .fraction = s->fraction, .bits = s->mask.bits};
+    for (int k = 0; k < 3; k++) {
+        out->size[k] = s->mask.size[k];
+        out->origin[k] = s->mask.origin[k];
+    }
+    return true;
 }
 
 uint32_t lathe_decoder_structures(const lathe_decoder *d) { return d->has_header ? d->header.structure_count : 0; }

@@ -32,6 +32,15 @@ void lathe_decoder_build_meshes(lathe_decoder *decoder, bool build);
  * cannot be built from hostile input. */
 const lathe_mesh *lathe_decoder_mesh(lathe_decoder *decoder, uint32_t structure);
 const lathe_transform *lathe_decoder_transform(const lathe_decoder *decoder, uint32_t structure);
+/* The voxels of a structure: the slices decoded so far. Pixel (u, v) of slice w is bit u & 63 of
+ * bits[(w * size[1] + v) * row_words + (u >> 6)]; there is an empty margin of one pixel in u and v. */
+typedef struct lathe_voxels {
+    int32_t size[3], origin[3], row_words;   /* origin: permuted voxel index of pixel (0, 0) of slice 0 */
+    int fraction;                  /* where the outlines cross border edges, 0..64 */
+    const uint64_t *bits;          /* the decoder's, until it closes; NULL: no slice yet */
+} lathe_voxels;
+/* False until the header is in, or if there is no such structure. */
+bool lathe_decoder_voxels(const lathe_decoder *decoder, uint32_t structure, lathe_voxels *out);
 uint32_t lathe_decoder_structures(const lathe_decoder *decoder);      /* 0 until the header is in */
 const char *lathe_decoder_error(const lathe_decoder *decoder);        /* detail of the failure, "" if none */
 
@@ -42,6 +51,8 @@ typedef struct lathe_level_info {
     uint64_t polar_bytes;          /* what a client fetches for this level of this structure, its share of headers included */
     uint64_t draco_bytes;          /* of the whole level as .drc, 0: not computed at bake time */
     float error_rms_mm, error_max_mm;   /* negative: not measured */
+    uint32_t components, components_waiting;   /* of the region: shown by the level, and not yet */
+    double waiting_mm3;            /* volume of those that wait */
 } lathe_level_info;
 typedef struct lathe_structure_info {
     const char *name;              /* UTF-8, unique in the model */
@@ -58,6 +69,8 @@ typedef struct lathe_model_info {
     lathe_axis axis;
     lathe_boundary boundary;
     double iso;                    /* NaN for labels */
+    bool keep_topology;            /* every level has the topology of the last */
+    bool caps;                     /* caps of the last level have coded shapes */
     /* Of the whole model at each level: area-weighted RMS, largest max (negative: not measured), and totals. */
     const lathe_level_info *levels;
 } lathe_model_info;
@@ -104,6 +117,8 @@ typedef struct lathe_bake_options {
     double iso;                    /* used when structure_count is 0 */
     const lathe_bake_structure *structures; size_t structure_count;   /* labels to bake; none: the threshold */
     const char *name;              /* of the model */
+    bool keep_topology;            /* every level gets the topology of the last, at the price of more bytes at first */
+    bool flat_caps;                /* caps rise half a voxel instead of following the grey values */
     bool measure;                  /* errors in mm (mesh against isosurface) */
     size_t samples;                /* per surface and level, shared over structures by area; 0: default */
     bool draco;                    /* also compute draco_bytes for `info` */

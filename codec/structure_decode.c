@@ -1,4 +1,5 @@
 #include <stdlib.h>
+#include <string.h>
 #include "structure_state.h"
 
 /* No ray reaches farther than the frame is wide and high together: what a packet may cost is bounded by its frame. */
@@ -12,36 +13,45 @@ static bool stars_fit(const lathe_structure_state *state, uint32_t count) {
     return true;
 }
 
-static lathe_status decode_base(lathe_structure_state *state, lathe_reader *reader, const char **fault) {
-    uint32_t kept = lathe__read_varint(reader), count;
-    *fault = LATHE_FAULT("base shape: list of kept slices");
-    if (reader->status || kept > (uint32_t)state->plan.slices || kept > lathe__reader_left(reader)) return LATHE_ERR_FORMAT;
-    int32_t *list = calloc(kept + 1, sizeof *list);
-    if (!list) return LATHE_ERR_MEMORY;
-    state->plan.kept = list;
-    state->plan.kept_count = kept;
-    int64_t w = -1;
-    for (uint32_t i = 0; i < kept; i++) {
-        w += (int64_t)lathe__read_varint(reader) + 1;
-        if (reader->status || w >= state->plan.slices) return LATHE_ERR_FORMAT;
-        list[i] = (int32_t)w;
+/* A small number for each slice, at most `most`; NULL if memory is out. */
+static uint8_t *read_steps(uint32_t count, lathe_range_decoder *d, uint16_t start, uint32_t most) {
+    uint8_t *steps = malloc(count);
+    lathe_number_model m;
+    lathe__number_start(&m, 1, start);
+    for (uint32_t i = 0; steps && i < count; i++) {
+        uint32_t v = (uint32_t)lathe__get_number(d, &m);
+        steps[i] = (uint8_t)(v > most ? most : v);
     }
+    return steps;
+}
+
+static lathe_status decode_stars(lathe_structure_state *state, lathe_range_decoder *d) {
     int32_t *slices;
+    uint32_t count;
     lathe_status status = lathe__level_slices(&slices, &count, &state->arena, &state->plan, 0);
     if (status) return status;
     state->base = LATHE_NEW(&state->arena, lathe_star_slice, count);
     if (!state->base) return LATHE_ERR_MEMORY;
-    lathe_range_decoder d;
-    lathe__decoder_start(&d, reader->at, lathe__reader_left(reader));
-    *fault = LATHE_FAULT("base shape: stars");
-    status = lathe__base_decode(state->base, count, &state->arena, &d, &state->mask);
+    status = lathe__base_decode(state->base, count, &state->arena, d, &state->mask);
     if (!status && !stars_fit(state, count)) status = LATHE_ERR_FORMAT;
     return status;
 }
 
+/* The shapes of the caps are read when the mesh is built: only then it is known which caps there are. */
+static lathe_status keep_caps(lathe_structure_state *state, const lathe_range_decoder *d) {
+    size_t size = (size_t)(d->end - d->at);
+    uint8_t *bytes = state->cap_bytes = LATHE_NEW(&state->arena, uint8_t, size + 1);
+    if (!bytes) return LATHE_ERR_MEMORY;
+    memcpy(bytes, d->at, size);
+    state->cap_code = *d;
+    state->cap_code.at = bytes;
+    state->cap_code.end = bytes + size;
+    return LATHE_OK;
+}
+
 static lathe_status decode_slices(lathe_structure_state *state, lathe_arena *scratch, lathe_occupancy **trained, uint32_t level,
-                                  const uint8_t *payload, size_t size, const char **fault) {
-    if (level == 1) {
+                                  lathe_range_decoder *d) {
+    if (level == lathe__first_exact(state)) {
         lathe_mask frame = state->mask;
         lathe_status status = lathe__mask_new(&state->mask, frame.size, frame.origin);
         if (!status) status = lathe__state_start_occupancy(state, trained);
@@ -50,33 +60,43 @@ static lathe_status decode_slices(lathe_structure_state *state, lathe_arena *scr
         state->base = NULL;
     }
     lathe_new_slice *list;
+    int32_t *shown;
     uint32_t count;
-    lathe_status status = lathe__new_slices(&list, &count, scratch, state, level);
-    lathe_range_decoder d;
-    lathe__decoder_start(&d, payload, size);
-    for (uint32_t i = 0; !status && i < count; i++) {
-        status = lathe__occupancy_decode(state->occupancy, &d, lathe__mask_slice(&state->mask, list[i].slice), &list[i].known);
-        if (d.overrun > 8) {
-            *fault = LATHE_FAULT("occupancy: the packet ends before its slices");
-            status = LATHE_ERR_FORMAT;
-        }
+    lathe_status status = lathe__level_slices(&shown, &count, scratch, &state->plan, level);
+    if (!status && state->flags & LATHE_FLAG_KEEP) {
+        free(state->finer);
+        state->finer = read_steps(count, d, LATHE_NUMBER_START, state->plan.level_count - 1 - level);
+        if (!state->finer) status = LATHE_ERR_MEMORY;
     }
-    lathe__arena_reset(scratch);
-    if (level + 1 == state->plan.level_count) lathe__occupancy_free(&state->occupancy);
-    return status;
+    if (!status) status = lathe__new_slices(&list, &count, scratch, state, level);
+    for (uint32_t i = 0; !status && i < count; i++) {
+        status = lathe__occupancy_decode(state->occupancy, d, lathe__mask_slice(&state->mask, list[i].slice), &list[i].known);
+        if (d->overrun > 8) status = LATHE_ERR_FORMAT;
+    }
+    if (level + 1 < state->plan.level_count) return status;
+    lathe__occupancy_free(&state->occupancy);
+    return status || !(state->flags & LATHE_FLAG_CAPS) ? status : keep_caps(state, d);
 }
 
 lathe_status lathe__structure_decode(lathe_structure_state *state, lathe_arena *scratch, lathe_occupancy **trained, uint32_t level,
                                      const uint8_t *payload, size_t size, const char **fault) {
     *fault = LATHE_FAULT("levels out of order");
     if (state->level + 1 != (int32_t)level || level >= state->plan.level_count) return LATHE_ERR_FORMAT;
+    lathe_range_decoder d;
+    lathe__decoder_start(&d, payload, size);
     lathe_status status;
     if (level == 0) {
-        lathe_reader reader = lathe__reader(payload, size);
-        status = decode_base(state, &reader, fault);
+        state->plan.early = read_steps((uint32_t)state->plan.slices, &d, LATHE_EARLY_START, LATHE_MAX_LEVELS);
+        if (!state->plan.early) return LATHE_ERR_MEMORY;
+        state->exact_base = state->flags & LATHE_FLAG_KEEP && lathe__decode_bit(&d, LATHE_NUMBER_START);
+    }
+    if (level < lathe__first_exact(state)) {
+        *fault = LATHE_FAULT("base shape: stars");
+        status = decode_stars(state, &d);
     } else {
-        *fault = LATHE_FAULT("occupancy");
-        status = decode_slices(state, scratch, trained, level, payload, size, fault);
+        *fault = LATHE_FAULT("slices: the packet is damaged or ends before them");
+        status = decode_slices(state, scratch, trained, level, &d);
+        lathe__arena_reset(scratch);
     }
     if (!status) state->level = (int32_t)level;
     return status;

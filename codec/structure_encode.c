@@ -3,41 +3,25 @@
 #include <string.h>
 
 void lathe__baked_free(lathe_baked_structure *baked) {
-    for (int i = 0; i < LATHE_MAX_LEVELS; i++) lathe__bytes_free(&baked->packets[i]);
+    for (int i = 0; i < LATHE_MAX_LEVELS; i++) {
+        lathe__bytes_free(&baked->packets[i]);
+        free(baked->finer[i]);
+        baked->finer[i] = NULL;
+    }
+    lathe__cap_list_free(&baked->caps);
 }
 
-static int by_number(const void *a, const void *b) {
-    int32_t p = *(const int32_t *)a, q = *(const int32_t *)b;
-    return (p > q) - (p < q);
-}
-
-/* First and last slices of components with at least 1/32 of the voxels, so that no level cuts a large part short. */
-static lathe_status keep_slices(lathe_structure_state *state) {
-    lathe_component *components;
-    size_t count, used = 0;
-    lathe_status status = lathe__mask_components(&components, &count, &state->mask);
-    if (status) return status;
-    int64_t voxels = 0;
-    for (size_t i = 0; i < count; i++) voxels += components[i].voxels;
-    int32_t *kept = calloc(2 * 32 + 1, sizeof *kept);
-    if (!kept) {
-        free(components);
-        return LATHE_ERR_MEMORY;
-    }
-    for (size_t i = 0; i < count; i++) {
-        if (components[i].voxels * 32 < voxels || used + 2 > 64) continue;
-        kept[used++] = components[i].first_slice;
-        kept[used++] = components[i].last_slice;
-    }
-    free(components);
-    qsort(kept, used, sizeof *kept, by_number);
-    uint32_t n = 0;
-    for (size_t i = 0; i < used; i++)
-        /* The first and the last slice of the structure are always shown. */
-        if (kept[i] > 0 && kept[i] < state->plan.slices - 1 && (!n || kept[n - 1] != kept[i])) kept[n++] = kept[i];
-    state->plan.kept = kept;
-    state->plan.kept_count = n;
-    return LATHE_OK;
+lathe_status lathe__encoded_mesh(lathe_mesh *out, lathe_arena arena[2], lathe_structure_state *state, const lathe_baked_structure *baked,
+                                 uint32_t level, lathe_surface_counts *counts, uint32_t *shown) {
+    lathe_cap_list replay = baked->caps;
+    replay.next = 0;
+    state->level = (int32_t)level;
+    state->finer = baked->finer[level];
+    state->caps = replay.count ? &replay.caps : NULL;
+    lathe_status status = lathe__state_mesh(out, arena, state, counts, shown);
+    state->finer = NULL;
+    state->caps = NULL;
+    return status;
 }
 
 static lathe_status append_coded(lathe_bytes *out, lathe_range_encoder *e) {
@@ -48,14 +32,18 @@ static lathe_status append_coded(lathe_bytes *out, lathe_range_encoder *e) {
     return failed ? LATHE_ERR_MEMORY : LATHE_OK;
 }
 
-static lathe_status encode_base(lathe_bytes *out, lathe_structure_state *state, lathe_arena *scratch) {
-    int32_t *slices, stride = lathe__level_stride(&state->plan, 0), at = -1;
+static void put_steps(lathe_range_encoder *e, const uint8_t *steps, uint32_t count, uint16_t start) {
+    lathe_number_model m;
+    lathe__number_start(&m, 1, start);
+    for (uint32_t i = 0; i < count; i++) lathe__put_number(e, &m, steps[i]);
+}
+
+/* ---- level 0 ---- */
+
+static lathe_status fit_stars(lathe_structure_state *state, lathe_arena *scratch) {
+    int32_t *slices, stride = lathe__level_stride(&state->plan, 0);
     uint32_t count;
-    lathe__emit_varint(out, state->plan.kept_count);
-    for (uint32_t i = 0; i < state->plan.kept_count; i++) {
-        lathe__emit_varint(out, (uint64_t)(state->plan.kept[i] - at - 1));
-        at = state->plan.kept[i];
-    }
+    lathe__arena_free(&state->arena);
     lathe_status status = lathe__level_slices(&slices, &count, &state->arena, &state->plan, 0);
     if (status) return status;
     state->base = LATHE_NEW(&state->arena, lathe_star_slice, count);
@@ -71,35 +59,92 @@ static lathe_status encode_base(lathe_bytes *out, lathe_structure_state *state, 
         lathe__arena_reset(scratch);
         if (status) return status;
     }
-    lathe_range_encoder e;
-    lathe__encoder_start(&e);
-    status = lathe__base_encode(&e, state->base, count, &state->mask);
-    lathe_status appended = append_coded(out, &e);
-    return status ? status : appended;
+    return LATHE_OK;
 }
 
-static lathe_status encode_slices(lathe_bytes *out, lathe_structure_state *state, lathe_arena *scratch, uint32_t level) {
+/* Stars that have the topology of the last level, and something of each component, are the smaller base shape; else level 0 has
+ * slices, too. */
+static lathe_status choose_base(lathe_structure_state *state, lathe_arena arena[2]) {
+    lathe_topology all;
+    lathe_status status = lathe__mask_topology(&all, &state->mask, NULL);
+    if (!status) status = fit_stars(state, &arena[0]);
+    lathe_mesh mesh = {0};
+    lathe_surface_counts counts;
+    uint32_t shown;
+    lathe_level_info levels[LATHE_MAX_LEVELS];
+    bool keeps = false;
+    state->level = 0;
+    state->exact_base = false;
+    if (!status) status = lathe__state_mesh(&mesh, arena, state, &counts, &shown);
+    if (!status) status = lathe__mesh_keeps(&keeps, &mesh, &all);
+    lathe_mesh_free(&mesh);
+    if (!status) status = lathe__count_waiting(levels, state, &arena[0]);
+    state->exact_base = !status && (!keeps || levels[0].components_waiting);
+    return status;
+}
+
+static lathe_status choose_plan(lathe_structure_state *state, lathe_arena arena[2], const lathe_encode_source *source) {
+    bool keep = state->flags & LATHE_FLAG_KEEP;
+    lathe_status status = lathe__begin_early(state, keep ? 0 : source->slice_ratio);
+    if (status || !keep) return status ? status : fit_stars(state, &arena[0]);
+    status = choose_base(state, arena);   /* with few slices; then with as many as a level of slices needs */
+    if (!status) status = lathe__keep_slices(state);
+    return status || !state->exact_base ? status : choose_base(state, arena);
+}
+
+/* ---- the other levels ---- */
+
+static lathe_status encode_slices(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2], lathe_range_encoder *e,
+                                  uint32_t level) {
     lathe_new_slice *list;
+    int32_t *shown;
     uint32_t count;
-    lathe_status status = lathe__new_slices(&list, &count, scratch, state, level);
+    lathe_status status = LATHE_OK;
+    if (state->flags & LATHE_FLAG_KEEP) {
+        status = lathe__keep_outlines(&out->finer[level], state, arena, level);
+        if (!status) status = lathe__level_slices(&shown, &count, &arena[0], &state->plan, level);
+        if (!status) put_steps(e, out->finer[level], count, LATHE_NUMBER_START);
+    }
+    if (!status) status = lathe__new_slices(&list, &count, &arena[0], state, level);
+    for (uint32_t i = 0; !status && i < count; i++)
+        status = lathe__occupancy_encode(state->occupancy, e, lathe__mask_slice(&state->mask, list[i].slice), &list[i].known);
+    lathe__arena_reset(&arena[0]);
+    return status;
+}
+
+static lathe_status encode_level(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2], uint32_t level,
+                                 const lathe_encode_source *source) {
     lathe_range_encoder e;
     lathe__encoder_start(&e);
-    for (uint32_t i = 0; !status && i < count; i++)
-        status = lathe__occupancy_encode(state->occupancy, &e, lathe__mask_slice(&state->mask, list[i].slice), &list[i].known);
-    lathe__arena_reset(scratch);
-    lathe_status appended = append_coded(out, &e);
+    lathe_status status = LATHE_OK;
+    if (level == 0) {
+        put_steps(&e, state->plan.early, (uint32_t)state->plan.slices, LATHE_EARLY_START);
+        if (state->flags & LATHE_FLAG_KEEP) lathe__encode_bit(&e, LATHE_NUMBER_START, state->exact_base);
+    }
+    if (level < lathe__first_exact(state)) {
+        int32_t *slices;
+        uint32_t count;
+        status = lathe__level_slices(&slices, &count, &state->arena, &state->plan, 0);
+        if (!status) status = lathe__base_encode(&e, state->base, count, &state->mask);
+    } else {
+        status = encode_slices(out, state, arena, &e, level);
+    }
+    if (!status && level + 1 == out->level_count && state->flags & LATHE_FLAG_CAPS) {
+        status = lathe__choose_caps(&out->caps, state, arena, source);
+        if (!status) lathe__encode_caps(&e, &out->caps);
+    }
+    lathe_status appended = append_coded(&out->packets[level], &e);
     return status ? status : appended;
 }
 
 lathe_status lathe__structure_encode(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2],
-                                     lathe_occupancy **trained) {
+                                     lathe_occupancy **trained, const lathe_encode_source *source) {
     state->plan.slices = state->mask.size[2];
     state->plan.level_count = lathe__choose_levels(state->plan.slices);
     out->level_count = state->plan.level_count;
-    lathe_status status = keep_slices(state);
-    if (!status) status = encode_base(&out->packets[0], state, &arena[0]);
+    lathe_status status = choose_plan(state, arena, source);
     if (!status) status = lathe__state_start_occupancy(state, trained);
-    for (uint32_t level = 1; !status && level < out->level_count; level++)
-        status = encode_slices(&out->packets[level], state, &arena[0], level);
+    for (uint32_t level = 0; !status && level < out->level_count; level++) status = encode_level(out, state, arena, level, source);
+    if (!status) status = lathe__count_waiting(out->levels, state, &arena[0]);
     return status;
 }

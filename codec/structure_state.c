@@ -3,10 +3,29 @@
 
 void lathe__state_free(lathe_structure_state *state) {
     lathe__mask_free(&state->mask);
-    free((void *)(uintptr_t)state->plan.kept);
-    state->plan.kept = NULL;
+    free((void *)(uintptr_t)state->plan.early);
+    free(state->finer);
     lathe__arena_free(&state->arena);
     lathe__occupancy_free(&state->occupancy);
+}
+
+void lathe__number_start(lathe_number_model *models, int count, uint16_t zero) {
+    lathe_bit_model *bit = models->bit, *end = models[count].bit;
+    for (; bit < end; bit++) *bit = (lathe_bit_model){LATHE_NUMBER_START, 2};
+    models->bit[0].p1 = zero;
+}
+
+/* Reads the shapes of caps while a mesh is built, each time from the first one. */
+typedef struct cap_reader {
+    lathe_caps caps;
+    lathe_range_decoder code;
+    lathe_number_model models[LATHE_CAP_MODELS];
+} cap_reader;
+
+static uint32_t read_shape(lathe_caps *caps, const lathe_mesh *mesh, uint32_t vertices, uint32_t side) {
+    cap_reader *r = (cap_reader *)caps;
+    (void)mesh, (void)side;
+    return (7 - (uint32_t)lathe__get_number(&r->code, &r->models[lathe__cap_context(vertices)])) & 7;
 }
 
 lathe_status lathe__state_start_occupancy(lathe_structure_state *state, lathe_occupancy **trained) {
@@ -30,7 +49,7 @@ lathe_status lathe__new_slices(lathe_new_slice **out, uint32_t *count, lathe_are
     int32_t *now, *before = NULL;
     uint32_t now_count, before_count = 0, n = 0;
     lathe_status status = lathe__level_slices(&now, &now_count, arena, &state->plan, level);
-    if (!status && level > 1) status = lathe__level_slices(&before, &before_count, arena, &state->plan, level - 1);
+    if (!status && level > lathe__first_exact(state)) status = lathe__level_slices(&before, &before_count, arena, &state->plan, level - 1);
     if (status) return status;
     lathe_new_slice *list = LATHE_NEW(arena, lathe_new_slice, now_count);
     if (!list) return LATHE_ERR_MEMORY;
@@ -74,9 +93,13 @@ lathe_status lathe__state_mesh(lathe_mesh *out, lathe_arena arena[2], const lath
     lathe_arena list = {0};
     lathe_status status = lathe__level_slices(&slices, shown, &list, &state->plan, (uint32_t)state->level);
     if (!status) {
-        if (state->level == 0) status = base_mesh(out, arena, state, slices, *shown, counts);
-        else status = lathe__build_surface(out, arena, &state->mask, slices, *shown, state->fraction,
-                                           state->plan.level_count - 1 - (uint32_t)state->level, counts);
+        cap_reader reader = {.caps = {read_shape}, .code = state->cap_code};
+        lathe__number_start(reader.models, LATHE_CAP_MODELS, LATHE_NUMBER_START);
+        bool last = (uint32_t)state->level + 1 == state->plan.level_count;
+        lathe_surface_style style = {.fraction = state->fraction, .coarseness = state->plan.level_count - 1 - (uint32_t)state->level,
+                                     .finer = state->finer, .caps = !last ? NULL : state->cap_bytes ? &reader.caps : state->caps};
+        if (!state->level && !state->exact_base) status = base_mesh(out, arena, state, slices, *shown, counts);
+        else status = lathe__build_styled(out, arena, &state->mask, slices, *shown, &style, counts);
     }
     lathe__arena_reset(&arena[0]);
     lathe__arena_reset(&arena[1]);

@@ -7,16 +7,35 @@
 #include "occupancy.h"
 
 typedef struct lathe_structure_state {
-    lathe_mask mask;           /* bits are allocated with level 1 */
-    lathe_level_plan plan;     /* kept: owned */
+    lathe_mask mask;           /* bits are allocated with the first level of slices */
+    lathe_level_plan plan;     /* early: owned */
     int fraction;              /* of border edges, header parameter 0 */
+    uint32_t flags;            /* header parameter 1 */
+    bool exact_base;           /* level 0 has slices, too, and no stars */
     int32_t level;             /* -1: nothing decoded yet */
-    lathe_arena arena;         /* of the base shape */
+    uint8_t *finer;            /* of the level's shown slices, if the topology is kept; owned */
+    lathe_arena arena;         /* of the base shape, then of the caps */
     lathe_star_slice *base;    /* one for each slice of level 0 */
     lathe_occupancy *occupancy;
+    lathe_range_decoder cap_code; /* the last packet from its caps on */
+    uint8_t *cap_bytes;        /* in the arena; NULL: caps rise half a voxel */
+    lathe_caps *caps;          /* instead of the code: an encoder's */
 } lathe_structure_state;
 
 void lathe__state_free(lathe_structure_state *state);
+
+/* The first level whose packet has slices. */
+static inline uint32_t lathe__first_exact(const lathe_structure_state *state) { return !state->exact_base; }
+
+/* ---- adaptive numbers beside stars and pixels ---- */
+/* Slices that begin early are rare in most structures; slices finer than their level are alike. */
+enum { LATHE_EARLY_START = 4 << 8, LATHE_NUMBER_START = 128 << 8 };
+/* Fresh contexts; zero: the chance that the first one's number is not 0, in 65536ths. */
+void lathe__number_start(lathe_number_model *models, int count, uint16_t zero);
+
+/* A cap's shape is 7 minus a number, in a context by the size of its cell. */
+enum { LATHE_CAP_MODELS = 4 };
+static inline int lathe__cap_context(uint32_t vertices) { return vertices >= 8 ? 3 : vertices >= 4 ? 2 : vertices >= 2; }
 
 /* The slices that a level adds to the ones before, in coding order, with what is then known around each. */
 typedef struct lathe_new_slice { int32_t slice; lathe_known known; } lathe_new_slice;

@@ -41,6 +41,7 @@ static uint32_t unite(parts *p, uint32_t a, uint32_t b) {
     if (from->first_slice < to->first_slice) to->first_slice = from->first_slice;
     if (from->last_slice > to->last_slice) to->last_slice = from->last_slice;
     to->voxels += from->voxels;
+    to->found = to->found || from->found;
     return a;
 }
 
@@ -120,7 +121,7 @@ static void join_rows(parts *p, run *a, const run *a_end, const run *b, const ru
     }
 }
 
-static lathe_status join_slice(parts *p, slice_runs *here, const slice_runs *before, int32_t rows, int32_t w) {
+static lathe_status join_slice(parts *p, slice_runs *here, const slice_runs *before, int32_t rows, int32_t w, const lathe_probe *probe) {
     for (int32_t v = 0; v < rows; v++) {
         run *first = here->runs + here->row[v], *end = here->runs + here->row[v + 1];
         if (first == end) continue;
@@ -132,16 +133,17 @@ static lathe_status join_slice(parts *p, slice_runs *here, const slice_runs *bef
             lathe_component *c = &p->of[find_root(p->parent, r->part)];
             c->voxels += r->last - r->first + 1;
             c->last_slice = w; /* slices come in order */
+            if (probe && !c->found) c->found = probe->look(probe->context, r->first + (r->last - r->first) / 2, v, w);
         }
     }
     return LATHE_OK;
 }
 
-static lathe_status join_all(parts *p, slice_runs slices[2], const lathe_mask *mask) {
+static lathe_status join_all(parts *p, slice_runs slices[2], const lathe_mask *mask, const lathe_probe *probe) {
     for (int32_t w = 0; w < mask->size[2]; w++) {
         slice_runs *here = &slices[w & 1], *before = w ? &slices[(w + 1) & 1] : NULL;
         if (!read_runs(here, mask, w)) return LATHE_ERR_MEMORY;
-        lathe_status status = join_slice(p, here, before, mask->size[1], w);
+        lathe_status status = join_slice(p, here, before, mask->size[1], w, probe);
         if (status) return status;
     }
     return LATHE_OK;
@@ -161,6 +163,10 @@ static lathe_status collect(lathe_component **out, size_t *count, const parts *p
 }
 
 lathe_status lathe__mask_components(lathe_component **out, size_t *count, const lathe_mask *mask) {
+    return lathe__find_components(out, count, mask, NULL);
+}
+
+lathe_status lathe__find_components(lathe_component **out, size_t *count, const lathe_mask *mask, const lathe_probe *probe) {
     size_t rows = (size_t)mask->size[1] + 1;
     parts p = {0};
     slice_runs slices[2] = {{0}};
@@ -171,7 +177,7 @@ lathe_status lathe__mask_components(lathe_component **out, size_t *count, const 
         slices[i].row = calloc(rows, sizeof *slices[i].row);
         ready = ready && slices[i].runs && slices[i].row;
     }
-    lathe_status status = ready ? join_all(&p, slices, mask) : LATHE_ERR_MEMORY;
+    lathe_status status = ready ? join_all(&p, slices, mask, probe) : LATHE_ERR_MEMORY;
     if (!status) status = collect(out, count, &p);
     for (int i = 0; i < 2; i++) {
         free(slices[i].runs);

@@ -8,20 +8,23 @@ uint32_t lathe__choose_levels(int32_t slices) {
     return levels;
 }
 
+uint32_t lathe__regular_level(const lathe_level_plan *plan, int32_t w) {
+    uint32_t level = w && w < plan->slices - 1 ? plan->level_count - 1 : 0;
+    for (; level && !(w & 1); w >>= 1) level--;
+    return level;
+}
+
+uint32_t lathe__slice_level(const lathe_level_plan *plan, int32_t w) {
+    uint32_t level = lathe__regular_level(plan, w), early = plan->early ? plan->early[w] : 0;
+    return level > early ? level - early : 0;
+}
+
 lathe_status lathe__level_slices(int32_t **out, uint32_t *count, lathe_arena *arena, const lathe_level_plan *plan, uint32_t level) {
-    int32_t stride = lathe__level_stride(plan, level);
-    int32_t *list = LATHE_NEW(arena, int32_t, (size_t)plan->slices / (size_t)stride + plan->kept_count + 2);
+    int32_t *list = LATHE_NEW(arena, int32_t, plan->slices);
     if (!list) return LATHE_ERR_MEMORY;
-    uint32_t n = 0, kept = 0;
-    for (int32_t w = 0;; w += stride) {
-        int32_t regular = w < plan->slices - 1 ? w : plan->slices - 1;
-        while (kept < plan->kept_count && plan->kept[kept] <= regular) {
-            if (plan->kept[kept] < regular && (!n || plan->kept[kept] > list[n - 1])) list[n++] = plan->kept[kept];
-            kept++;
-        }
-        if (!n || list[n - 1] < regular) list[n++] = regular;
-        if (regular == plan->slices - 1) break;
-    }
+    uint32_t n = 0;
+    for (int32_t w = 0; w < plan->slices; w++)
+        if (lathe__slice_level(plan, w) <= level) list[n++] = w;
     *out = list;
     *count = n;
     return LATHE_OK;
@@ -37,6 +40,11 @@ uint32_t lathe__choose_rays(int64_t reach, uint32_t coarseness) {
 
 lathe_status lathe__stack_outlines(lathe_mesh *out, lathe_arena *scratch, const lathe_outline *outlines, const int32_t *heights,
                                    uint32_t count, bool lattice, lathe_surface_counts *counts) {
+    return lathe__stack_with_caps(out, scratch, outlines, heights, count, lattice, NULL, counts);
+}
+
+lathe_status lathe__stack_with_caps(lathe_mesh *out, lathe_arena *scratch, const lathe_outline *outlines, const int32_t *heights,
+                                    uint32_t count, bool lattice, lathe_caps *caps, lathe_surface_counts *counts) {
     static const lathe_outline air = {0};
     lathe_mesh_builder builder = {0};
     size_t points = 0;
@@ -53,7 +61,7 @@ lathe_status lathe__stack_outlines(lathe_mesh *out, lathe_arena *scratch, const 
         lathe_slab slab = {.outline = {i ? &outlines[i - 1] : &air, i < count ? &outlines[i] : &air},
                            .height = {(i ? heights[i - 1] : heights[0] - 1) * LATHE_LATTICE_ONE,
                                       (i < count ? heights[i] : heights[count - 1] + 1) * LATHE_LATTICE_ONE},
-                           .base = {base, above}, .cap = LATHE_LATTICE_ONE / 2, .lattice = lattice};
+                           .base = {base, above}, .cap = LATHE_LATTICE_ONE / 2, .caps = caps, .lattice = lattice};
         status = lathe__overlay_slab(&builder, scratch, &slab, &counts->overlay);
         base = above;
         lathe__arena_reset(scratch);
@@ -82,15 +90,22 @@ static uint32_t rays_of_whole_loop(const lathe_outline *outline, const lathe_loo
 
 lathe_status lathe__build_surface(lathe_mesh *out, lathe_arena arena[2], const lathe_mask *mask, const int32_t *slices,
                                   uint32_t count, int fraction, uint32_t coarseness, lathe_surface_counts *counts) {
+    lathe_surface_style style = {.fraction = fraction, .coarseness = coarseness};
+    return lathe__build_styled(out, arena, mask, slices, count, &style, counts);
+}
+
+lathe_status lathe__level_outlines(lathe_outline **out, lathe_arena arena[2], const lathe_mask *mask, const int32_t *slices,
+                                   uint32_t count, const lathe_surface_style *style, lathe_surface_counts *counts) {
     lathe_arena *keep = &arena[0], *scratch = &arena[1];
-    lathe_outline *outlines = LATHE_NEW(keep, lathe_outline, count);
+    lathe_outline *outlines = *out = LATHE_NEW(keep, lathe_outline, count);
     if (!outlines) return LATHE_ERR_MEMORY;
     for (uint32_t i = 0; i < count; i++) {
         lathe_slice_view view = {.pixels = lathe__mask_slice(mask, slices[i]),
                                  .below = i ? lathe__mask_slice(mask, slices[i - 1]) : NULL,
                                  .above = i + 1 < count ? lathe__mask_slice(mask, slices[i + 1]) : NULL,
                                  .width = mask->size[0], .height = mask->size[1], .row_words = mask->row_words,
-                                 .parity = (int)(i & 1), .fraction = fraction};
+                                 .parity = (int)(i & 1), .fraction = style->fraction};
+        uint32_t coarseness = style->coarseness - (style->finer ? style->finer[i] : 0);
         int32_t *border;
         lathe_status status;
         if (coarseness) {
@@ -109,7 +124,14 @@ lathe_status lathe__build_surface(lathe_mesh *out, lathe_arena arena[2], const l
             if (loop->rays > counts->rays) counts->rays = loop->rays;
         }
     }
-    lathe_status status = lathe__stack_outlines(out, scratch, outlines, slices, count, !coarseness, counts);
-    lathe__arena_reset(keep);
+    return LATHE_OK;
+}
+
+lathe_status lathe__build_styled(lathe_mesh *out, lathe_arena arena[2], const lathe_mask *mask, const int32_t *slices, uint32_t count,
+                                 const lathe_surface_style *style, lathe_surface_counts *counts) {
+    lathe_outline *outlines;
+    lathe_status status = lathe__level_outlines(&outlines, arena, mask, slices, count, style, counts);
+    if (!status) status = lathe__stack_with_caps(out, &arena[1], outlines, slices, count, !style->coarseness, style->caps, counts);
+    lathe__arena_reset(&arena[0]);
     return status;
 }

@@ -51,9 +51,13 @@ lathe_status lathe__region_label_box(lathe_mask *out, const lathe_volume *volume
 lathe_axis lathe__axis_auto(const lathe_volume *volume);
 
 /* ---- components.c: what lies where, by 6-connectivity (background: 26) ---- */
-typedef struct lathe_component { int32_t first_slice, last_slice; int64_t voxels; } lathe_component;
+typedef struct lathe_component { int32_t first_slice, last_slice; int64_t voxels; bool found; } lathe_component;
 /* The 6-connected components, in order of their first pixel (w, v, u); *out is malloc'ed. */
 lathe_status lathe__mask_components(lathe_component **out, size_t *count, const lathe_mask *mask);
+
+/* Asked for the middle pixel of runs; a component is found if it says true for one of its runs. */
+typedef struct lathe_probe { bool (*look)(const void *context, int32_t u, int32_t v, int32_t w); const void *context; } lathe_probe;
+lathe_status lathe__find_components(lathe_component **out, size_t *count, const lathe_mask *mask, const lathe_probe *probe);
 
 typedef struct lathe_topology {
     int64_t components;        /* 6-connected components of the region */

@@ -626,6 +626,17 @@ static void emit_split(overlay *o, int p, const uint32_t v[3], const uint32_t mi
 
 static uint32_t next_node(const overlay *o) { return o->vertices + o->builder->mesh.vertex_count - o->extra; }
 
+/* Height of the middle of a chord; sides: of the cell's nodes. Over a single outline a cap of some shape, else half way. */
+static int32_t height_over(const overlay *o, uint32_t sides, uint32_t shape, uint32_t a, uint32_t b) {
+    int32_t rise = o->slab->cap;
+    if (o->slab->caps) {
+        int64_t x = o->at[a].x - o->at[b].x, y = o->at[a].y - o->at[b].y, bow = (x * x + y * y) >> (LATHE_LATTICE_BITS - 7 + 2 * shape);
+        if (shape < 4) bow = (int64_t)(2 * shape + 1) * (LATHE_LATTICE_ONE / 8);
+        rise = bow < LATHE_RISE_MIN ? LATHE_RISE_MIN : bow > LATHE_RISE_MAX ? LATHE_RISE_MAX : (int32_t)bow;
+    }
+    return sides == 1 ? o->slab->height[0] + rise : sides == 2 ? o->slab->height[1] - rise : mid_height(o);
+}
+
 static lathe_status triangulate_cell(overlay *o, uint32_t id) {
     int p = o->cycles[id].of;
     uint32_t total = 0, rings = 0, sides = 0;
@@ -652,14 +663,14 @@ static lathe_status triangulate_cell(overlay *o, uint32_t id) {
     memset(mid, 0xff, (size_t)count * 3 * sizeof *mid);
     status = lathe__builder_reserve(o->builder, 0, (size_t)count * 4);
     if (status) return status;
-    int32_t z = mid_height(o);
-    if (sides == 1) z = imin(z, o->slab->height[0] + o->slab->cap);
-    if (sides == 2) z = imax(z, o->slab->height[1] - o->slab->cap);
+    uint32_t shape = 0;
+    if (single && o->slab->caps) /* 3T - 2I edges bound the cell */
+        shape = o->slab->caps->shape(o->slab->caps, &o->builder->mesh, count > 1 ? (count * 3 - total) / 2 : 1, sides >> 1);
     for (uint32_t i = 0; i < count * 3; i++) {
         uint32_t a = t[i / 3][i % 3], b = t[i / 3][(i + 1) % 3], j = neighbour[i];
         if (j == NONE || mid[i] != NONE || a >= o->vertices || node_side(o, a) != node_side(o, b)) continue;
         mid[i] = mid[j] = next_node(o);
-        status = add_vertex(o, (o->at[a].x + o->at[b].x) / 2, (o->at[a].y + o->at[b].y) / 2, z);
+        status = add_vertex(o, (o->at[a].x + o->at[b].x) / 2, (o->at[a].y + o->at[b].y) / 2, height_over(o, sides, shape, a, b));
         if (status) return status;
     }
     for (uint32_t i = 0; i < count; i++) {
@@ -676,7 +687,7 @@ static lathe_status triangulate_cell(overlay *o, uint32_t id) {
             x += o->at[v[k]].x;
             y += o->at[v[k]].y;
         }
-        return add_vertex(o, (int32_t)(x / 3), (int32_t)(y / 3), z);
+        return add_vertex(o, (int32_t)(x / 3), (int32_t)(y / 3), height_over(o, sides, shape, v[0], v[1]));
     }
     return LATHE_OK;
 }

@@ -19,11 +19,21 @@ typedef struct lathe_meeting {
     bool enters;               /* the lower outline enters the upper region here */
 } lathe_meeting;
 
+enum { LATHE_RISE_MIN = LATHE_LATTICE_ONE / 64, LATHE_RISE_MAX = LATHE_LATTICE_ONE - LATHE_RISE_MIN };
+/* The shape of the caps: asked for each cell of a single outline, in the order in which a mesh is built. */
+typedef struct lathe_caps {
+    /* vertices: how many are about to be added, behind mesh->vertex_count; side: 0 they rise from the lower slice, 1 fall from the
+     * upper one. 0 .. 3: all by (2 * shape + 1) / 8 of a slice distance; 4 .. 7: the middle of a chord of c pixels by
+     * c * c / 2^(2 * shape - 7), as on a paraboloid. */
+    uint32_t (*shape)(struct lathe_caps *caps, const lathe_mesh *mesh, uint32_t vertices, uint32_t side);
+} lathe_caps;
+
 typedef struct lathe_slab {
     const lathe_outline *outline[2];   /* lower, upper; an outline without points is air */
     int32_t height[2];                 /* of the two slices, lattice units, height[0] < height[1] */
     uint32_t base[2];                  /* where their vertices begin in the mesh */
-    int32_t cap;                       /* how far a cell of a single outline rises from its slice, lattice units */
+    int32_t cap;                       /* how far a cell of a single outline rises from its slice, lattice units, */
+    lathe_caps *caps;                  /* or of its own shape; NULL: cap */
     bool lattice;                      /* every edge lies within one pixel square */
 } lathe_slab;
 

@@ -16,7 +16,7 @@ typedef struct lathe_command {
 } lathe_command;
 
 extern const lathe_command lathe__command_bake, lathe__command_serve, lathe__command_info, lathe__command_export,
-    lathe__command_verify, lathe__command_bench, lathe__command_hash;
+    lathe__command_verify, lathe__command_bench, lathe__command_hash, lathe__command_draw, lathe__command_reconstruct;
 
 /* ---- options ---- */
 typedef struct lathe_option {
@@ -63,12 +63,15 @@ bool lathe__interrupted(void);
 /* ---- shared by bake and serve ---- */
 typedef struct lathe_bake_arguments {
     const char *input, *output, *name;
-    const char *iso, *label, *labels, *axis, *boundary;
+    const char *iso, *label, *labels, *axis, *boundary, *topology, *spacing;
     bool errors, draco, quiet;
 } lathe_bake_arguments;
 void lathe__bake_arguments_defaults(lathe_bake_arguments *arguments);
 /* command is for complaints about usage. Returns an exit status. */
 int lathe__bake_input(const lathe_command *command, const lathe_bake_arguments *arguments);
+/* contour_bake.c: a volume; or a contour set, reconstructed and put on a grid of a->spacing mm. NULL spacing: the median of the
+ * distances of its sections, but 64 to 384 voxels along the longest side; said on stderr unless quiet. */
+lathe_status lathe__open_bake_input(lathe_volume **out, const lathe_bake_arguments *a, lathe_error *err);
 /* "dir/a.nii.gz" -> "a": the file's name without its volume suffix, cut to size. */
 void lathe__volume_stem(char *out, size_t size, const char *path);
 bool lathe__is_volume_path(const char *path);

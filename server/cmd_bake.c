@@ -110,8 +110,8 @@ static bool label_list_valid(const char *list) {
     }
 }
 
-/* What --axis and --boundary say; axis -1: auto. */
-typedef struct bake_settings { int axis, boundary; double iso; bool iso_given, labels; } bake_settings;
+/* What --axis, --boundary and --topology say; axis -1: auto. */
+typedef struct bake_settings { int axis, boundary; double iso; bool iso_given, labels, keep; } bake_settings;
 
 static int parse_settings(bake_settings *out, const lathe_command *command, const lathe_bake_arguments *a) {
     static const char *const axes[] = {"x", "y", "z"};
@@ -134,6 +134,9 @@ static int parse_settings(bake_settings *out, const lathe_command *command, cons
         else if (strcmp(a->boundary, "iso") == 0) s.boundary = LATHE_BOUNDARY_ISO;
         else return lathe__usage_error(command, "--boundary %s: it is one of edge, iso", a->boundary);
     }
+    s.keep = a->topology && strcmp(a->topology, "keep") == 0;
+    if (a->topology && !s.keep && strcmp(a->topology, "own") != 0)
+        return lathe__usage_error(command, "--topology %s: it is one of own, keep", a->topology);
     *out = s;
     return LATHE_PARSED;
 }
@@ -149,6 +152,7 @@ static int bake_volume(const lathe_volume *volume, const bake_settings *settings
     options.axis = settings->axis < 0 ? lathe__axis_auto(volume) : (lathe_axis)settings->axis;
     options.boundary = settings->boundary;
     options.iso = settings->iso;
+    options.keep_topology = settings->keep;
     options.structures = choice->structures;
     options.structure_count = choice->count;
     options.name = a->name ? a->name : stem;
@@ -189,7 +193,7 @@ int lathe__bake_input(const lathe_command *command, const lathe_bake_arguments *
     if (status != LATHE_PARSED) return status;
     lathe_volume *volume = NULL;
     lathe_error err = {{0}};
-    lathe_status opened = lathe_volume_open(&volume, a->input, &err);
+    lathe_status opened = lathe__open_bake_input(&volume, a, &err);
     if (opened) return lathe__status_error("bake", a->input, opened, &err);
     status = bake_settled(&settings, a, volume);
     lathe_volume_close(&volume);
@@ -222,6 +226,7 @@ static int run(int argc, char **argv) {
         LATHE_OPTION_TEXT("output", 'o', &a.output),   LATHE_OPTION_TEXT("iso", 0, &a.iso),
         LATHE_OPTION_TEXT("label", 0, &a.label),       LATHE_OPTION_TEXT("labels", 0, &a.labels),
         LATHE_OPTION_TEXT("axis", 0, &a.axis),         LATHE_OPTION_TEXT("boundary", 0, &a.boundary),
+        LATHE_OPTION_TEXT("topology", 0, &a.topology), LATHE_OPTION_TEXT("spacing", 0, &a.spacing),
         LATHE_OPTION_TEXT("name", 0, &a.name),         LATHE_OPTION_FLAG("no-errors", &a.errors, false),
         LATHE_OPTION_FLAG("draco", &a.draco, true),    LATHE_OPTION_FLAG("no-draco", &a.draco, false),
         LATHE_OPTION_FLAG("quiet", &a.quiet, true),    LATHE_OPTION_FLAG("json", &json, true),
@@ -250,6 +255,9 @@ const lathe_command lathe__command_bake = {
     "  --labels all|N,N   one surface for each label; names and colours from the table beside INPUT (as aal.nii.txt)\n"
     "  --axis A           slices across x, y, z or auto (default: the axis of the largest spacing, else z)\n"
     "  --boundary B       edge (middle of pixel borders; default for labels) or iso (between grey values; default else)\n"
+    "  --topology T       own: each level has that of its slices, small components wait (default); keep: every level has\n"
+    "                     the components, cavities and tunnels of the last, which takes more bytes at the start\n"
+    "  --spacing MM       of the grid that a contour set (.json with \"sections\") is put on; default: its sections' spacing\n"
     "  --name NAME        of the model; default: INPUT's name\n"
     "  --no-errors        do not measure the levels' errors (faster)\n"
     "  --no-draco         do not measure the levels' size in Draco (faster)\n"

@@ -11,6 +11,7 @@
 
 typedef struct level_result {
     bool seen, last;
+    bool topology;                 /* must be that of the voxels: the last level, and every level of an archive that keeps it */
     lathe_mesh_report report;
     uint64_t float_duplicates;
     bool counts_match;             /* vertices and triangles are those of the index */
@@ -51,9 +52,8 @@ static bool topology_matches(const structure_result *structure, const level_resu
 static bool level_passes(const structure_result *structure, const level_result *level) {
     if (!level->seen || !level->counts_match || level->encoded_differs) return false;
     if (edge_flaws(&level->report) || shape_flaws(level)) return false;
-    if (!level->last) return true;
-    if (level->report.self_intersections) return false;
-    return !structure->compared || topology_matches(structure, level);
+    if (level->topology && structure->compared && !topology_matches(structure, level)) return false;
+    return !level->last || !level->report.self_intersections;
 }
 
 /* ---- gathering ---- */
@@ -73,6 +73,7 @@ static lathe_status prepare(verification *v) {
         v->structures[i].levels = calloc(levels ? levels : 1, sizeof(level_result));
         if (!v->structures[i].levels) return LATHE_ERR_MEMORY;
         if (levels) v->structures[i].levels[levels - 1].last = true;
+        for (uint32_t n = 0; n < levels; n++) v->structures[i].levels[n].topology = v->info->keep_topology || n + 1 == levels;
     }
     return LATHE_OK;
 }
@@ -240,7 +241,7 @@ static level_sum sum_level(const verification *v, uint32_t n) {
         sum.edges += edge_flaws(&level->report);
         sum.shapes += shape_flaws(level);
         sum.intersections += level->report.self_intersections;
-        sum.mismatches += !level->seen || !level->counts_match || level->encoded_differs || (level->last && s->compared && !topology_matches(s, level));
+        sum.mismatches += !level->seen || !level->counts_match || level->encoded_differs || (level->topology && s->compared && !topology_matches(s, level));
         sum.components += level->report.components;
         sum.euler += level->report.euler;
         sum.triangles += v->info->structures[i].levels[n].triangles;
@@ -266,7 +267,7 @@ static void print_flaw(const verification *v, uint32_t i, uint32_t n) {
                r->nonmanifold_vertices, r->degenerate_triangles, r->duplicate_positions, level->float_duplicates,
                r->unused_vertices, r->bad_indices);
     if (level->last && r->self_intersections) printf(" %" PRIu64 " self-intersections;", r->self_intersections);
-    if (level->last && s->compared && !topology_matches(s, level))
+    if (level->topology && s->compared && !topology_matches(s, level))
         printf(" %" PRIu64 " components and Euler characteristic %" PRId64 ", the voxels have %" PRId64 " and %" PRId64 ";",
                r->components, r->euler, s->expected_components, s->expected_euler);
     putchar('\n');
@@ -286,7 +287,7 @@ static void print_table(const verification *v, bool with_volume) {
     for (uint32_t i = 0; i < v->info->structure_count; i++)
         for (uint32_t n = 0; n < v->info->structures[i].level_count; n++)
             if (!level_passes(&v->structures[i], &v->structures[i].levels[n])) print_flaw(v, i, n);
-    printf("checksums right; %s; %s\n", with_volume ? "topology of each last level compared with the voxels" : "no volume to compare with",
+    printf("checksums right; %s; %s\n", !with_volume ? "no volume to compare with" : v->info->keep_topology ? "topology of every level compared with the voxels" : "topology of each last level compared with the voxels",
            v->failures ? "FAILED" : "passed");
 }
 
@@ -370,7 +371,8 @@ const lathe_command lathe__command_verify = {
     "Checks the checksums of FILE (.lathe), decodes it, and checks every level of every structure: closed, 2-manifold,\n"
     "oriented, no degenerate triangle, no two vertices at one position, vertices and triangles as the index says;\n"
     "self-intersections are counted and must be 0 at the last level. With the VOLUME it was baked from: components and\n"
-    "Euler characteristic of the last level are those of the voxels, which are counted independently; and the meshes are\n"
+    "Euler characteristic of the last level (with --topology keep: of every level) are those of the voxels, which are\n"
+    "counted independently; and the meshes are\n"
     "those that the volume gives when it is baked again.\n"
     "Exit status 1 when a check fails.\n\n"
     "  --json               every level of every structure\n"

@@ -8,6 +8,7 @@
 static const lathe_command *const commands[] = {
     &lathe__command_bake,   &lathe__command_serve,  &lathe__command_info, &lathe__command_export,
     &lathe__command_verify, &lathe__command_bench,  &lathe__command_hash,
+    &lathe__command_draw, &lathe__command_reconstruct,
 };
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
 
@@ -15,7 +16,7 @@ static void print_help(FILE *out) {
     fputs("Usage: lathe COMMAND [options]\n\n"
           "Turns a scanned or labelled volume into a surface that arrives in a browser pass by pass.\n\n", out);
     for (size_t i = 0; i < COMMAND_COUNT; i++)
-        if (commands[i]->summary) fprintf(out, "  %-8s %s\n", commands[i]->name, commands[i]->summary);
+        if (commands[i]->summary) fprintf(out, "  %-11s %s\n", commands[i]->name, commands[i]->summary);
     fputs("\n`lathe COMMAND --help` tells more about one; `lathe --version` prints the version.\n"
           "Exit status: 0 done, 1 bad input or a failed check, 2 wrong usage.\n", out);
 }

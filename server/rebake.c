@@ -42,6 +42,8 @@ lathe_status lathe__rebake(lathe_rebaked *out, const lathe_model_info *info, con
     options.boundary = (int)info->boundary;
     options.iso = info->iso;
     options.name = info->name;
+    options.keep_topology = info->keep_topology;
+    options.flat_caps = !info->caps;
     options.measure = options.draco = false;
     if (isnan(info->iso)) {
         options.structures = structures;

@@ -4,7 +4,7 @@
 #include <string.h>
 
 typedef struct route {
-    const char *segments[5];
+    const char *segments[6];
     lathe_handler handle;
 } route;
 static const route ROUTES[] = {
@@ -16,6 +16,9 @@ static const route ROUTES[] = {
     {{"models", "*", "levels", "*"}, lathe__handle_level},
     {{"models", "*", "deltas", "*.lathe"}, lathe__handle_delta},
     {{"models", "*", "stream"}, lathe__handle_stream},
+    {{"models", "*", "slices", "*.png"}, lathe__handle_slice_picture},
+    {{"models", "*", "slices", "*", "outline"}, lathe__handle_slice_outline},
+    {{"models", "*", "slices", "*", "contour"}, lathe__handle_slice_contour},
     {{"healthz"}, lathe__handle_health},
 };
 

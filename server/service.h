@@ -178,6 +178,9 @@ enum MHD_Result lathe__handle_archive(lathe_request *request);
 enum MHD_Result lathe__handle_level(lathe_request *request);
 enum MHD_Result lathe__handle_delta(lathe_request *request);
 enum MHD_Result lathe__handle_stream(lathe_request *request);
+enum MHD_Result lathe__handle_slice_picture(lathe_request *request);
+enum MHD_Result lathe__handle_slice_outline(lathe_request *request);
+enum MHD_Result lathe__handle_slice_contour(lathe_request *request);
 enum MHD_Result lathe__handle_health(lathe_request *request);
 
 /* ---- manifest.c ---- */

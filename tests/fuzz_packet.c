@@ -1,5 +1,6 @@
 /* libFuzzer target: the packets of one structure of 20 x 20 x 6 voxels, without a container around them. The first two bytes say
- * where the input is cut into the packets of levels 0, 1 and 2; after each, the mesh that a viewer would show is built. */
+ * where the input is cut into the packets of levels 0, 1 and 2, the third one is the header's flags (caps, topology kept); after each
+ * packet, the mesh that a viewer would show is built. */
 #include <stdlib.h>
 #include "structure_state.h"
 
@@ -12,10 +13,10 @@ static void check_mesh(const lathe_mesh *mesh) {
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size);
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
     static lathe_occupancy *trained; /* training takes longer than everything else here */
-    if (size < 2) return 0;
-    size_t left = size - 2, first = left * bytes[0] / 255, second = (left - first) * bytes[1] / 255;
-    size_t begin[4] = {2, 2 + first, 2 + first + second, size};
-    lathe_structure_state state = {.mask = {.size = {20, 20, 6}, .row_words = 1}, .fraction = 28, .level = -1};
+    if (size < 3) return 0;
+    size_t left = size - 3, first = left * bytes[0] / 255, second = (left - first) * bytes[1] / 255;
+    size_t begin[4] = {3, 3 + first, 3 + first + second, size};
+    lathe_structure_state state = {.mask = {.size = {20, 20, 6}, .row_words = 1}, .fraction = 28, .flags = bytes[2], .level = -1};
     lathe_arena arena[2] = {{0}, {0}};
     state.plan = (lathe_level_plan){.slices = 6, .level_count = 3};
     for (uint32_t level = 0; level < 3; level++) {

@@ -7,7 +7,7 @@ import net from 'node:net';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
-import { brotliDecompressSync, gunzipSync } from 'node:zlib';
+import { brotliDecompressSync, gunzipSync, inflateSync } from 'node:zlib';
 
 const program = process.env.LATHE_BIN ?? 'build/lathe';
 const folder = mkdtempSync(join(tmpdir(), 'lathe-server-'));
@@ -226,6 +226,162 @@ test('levels come in every format, whole or of one structure', async () => {
             assert.match(drc.headers['content-disposition'], query ? /^inline; filename="[\w.-]+-\d+\.drc"$/ : new RegExp(`filename="${several.id}-${n}\\.drc"`));
         }
     }
+});
+
+// ---- slices
+
+/* A PNG as written here: eight bits, RGBA, rows filtered by the one above. */
+function readPicture(bytes) {
+    assert.ok(bytes.subarray(0, 8).equals(Buffer.from([0x89, 0x50, 0x4e, 0x47, 13, 10, 26, 10])));
+    const chunks = {};
+    for (let at = 8; at < bytes.length;) {
+        const size = bytes.readUInt32BE(at), type = bytes.toString('latin1', at + 4, at + 8);
+        assert.equal(bytes.readUInt32BE(at + 8 + size), crc32(bytes.subarray(at + 4, at + 8 + size)), type);
+        chunks[type] = bytes.subarray(at + 8, at + 8 + size);
+        at += 12 + size;
+    }
+    const width = chunks.IHDR.readUInt32BE(0), height = chunks.IHDR.readUInt32BE(4), rows = inflateSync(chunks.IDAT);
+    assert.deepEqual([...chunks.IHDR.subarray(8)], [8, 6, 0, 0, 0]);
+    assert.equal(rows.length, height * (width * 4 + 1));
+    const pixels = Buffer.alloc(width * height * 4);
+    for (let y = 0; y < height; y++) {
+        const row = y * (width * 4 + 1);
+        assert.equal(rows[row], 2);
+        for (let i = 0; i < width * 4; i++) pixels[y * width * 4 + i] = rows[row + 1 + i] + (y ? pixels[(y - 1) * width * 4 + i] : 0);
+    }
+    return { width, height, at: (x, y) => pixels.subarray((y * width + x) * 4, (y * width + x) * 4 + 4) };
+}
+function crc32(bytes) {
+    let crc = ~0;
+    for (const byte of bytes) {
+        crc ^= byte;
+        for (let k = 0; k < 8; k++) crc = (crc >>> 1) ^ (crc & 1 ? 0xedb88320 : 0);
+    }
+    return ~crc >>> 0;
+}
+async function slicesOf(id, structure) {
+    const reply = await get(`/models/${id}/slices/9999.png${structure ? `?structure=${encodeURIComponent(structure)}` : ''}`);
+    isProblem(reply, 404, /slices \d+\.\.\d+/);
+    return /slices (\d+)\.\.(\d+)/.exec(reply.json().detail).slice(1).map(Number);
+}
+/* World millimetres to picture pixels. */
+function toPicture({ corner, right, down }, point) {
+    const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2], from = point.map((p, i) => p - corner[i]);
+    return [dot(from, right) / dot(right, right), dot(from, down) / dot(down, down)];
+}
+const turnOf = (a, b, c) => (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+const cross = (a, b, c, d) => turnOf(a, b, c) * turnOf(a, b, d) < 0 && turnOf(c, d, a) * turnOf(c, d, b) < 0;
+
+test('the picture of a slice and its outlines show the same', async () => {
+    for (const { id } of models) {
+        const [low, high] = await slicesOf(id);
+        const { structures } = (await get(`/models/${id}`)).json();
+        for (const k of [low, Math.floor((low + high) / 2), high]) {
+            const reply = await get(`/models/${id}/slices/${k}.png`);
+            assert.equal(reply.code, 200, reply.text);
+            assert.equal(reply.headers['content-type'], 'image/png');
+            const picture = readPicture(reply.body), outline = (await get(`/models/${id}/slices/${k}/outline`)).json();
+            assert.equal(outline.slice, k);
+            assert.equal(outline.tolerance_mm, 0);
+            assert.deepEqual([outline.picture.width, outline.picture.height], [picture.width, picture.height]);
+            const loops = outline.loops.map(({ structure, points }) => ({ structure, points: points.map((p) => toPicture(outline.picture, p)) }));
+            let seen = 0;
+            for (let y = 0; y < picture.height; y++)
+                for (let x = 0; x < picture.width; x++) {
+                    const inside = new Set();
+                    for (const { structure, points } of loops)
+                        points.forEach((a, i) => {
+                            const b = points[(i + 1) % points.length];
+                            if ((a[1] > y + 0.5) === (b[1] > y + 0.5) || x + 0.5 > a[0] + (b[0] - a[0]) * (y + 0.5 - a[1]) / (b[1] - a[1])) return;
+                            if (!inside.delete(structure)) inside.add(structure);
+                        });
+                    const [r, g, b, opacity] = picture.at(x, y);
+                    assert.equal(opacity, inside.size ? 255 : 0, `${id} ${k}: ${x} ${y}`);
+                    seen += inside.size;
+                    if (inside.size !== 1) continue;
+                    const { color } = structures.find(({ name }) => inside.has(name));
+                    assert.equal(`#${[r, g, b].map((v) => v.toString(16).padStart(2, '0')).join('')}`, color);
+                }
+            assert.ok(seen > 0 || k !== Math.floor((low + high) / 2), 'something is in the middle slice');
+        }
+    }
+});
+
+test('outlines at a tolerance have fewer points and never cross', async () => {
+    for (const { id } of models) {
+        const [low, high] = await slicesOf(id), k = Math.floor((low + high) / 2);
+        let before = Infinity;
+        for (const tolerance of ['0', '0.3', '1.5', '5', '1000']) {
+            const reply = await get(`/models/${id}/slices/${k}/outline?tolerance=${tolerance}`);
+            const { loops, tolerance_mm: told, picture } = reply.json();
+            assert.equal(told, Number(tolerance));
+            const count = loops.reduce((sum, { points }) => sum + points.length, 0);
+            assert.ok(count <= before);
+            before = count;
+            const edges = loops.flatMap(({ structure, points }) => {
+                const flat = points.map((p) => toPicture(picture, p));
+                assert.ok(flat.length >= 3);
+                return flat.map((p, i) => [structure, p, flat[(i + 1) % flat.length]]);
+            });
+            edges.forEach(([s, a, b], i) => { for (const [t, c, d] of edges.slice(i + 1)) assert.ok(s !== t || !cross(a, b, c, d), `${id} ${tolerance}`); });
+        }
+    }
+});
+
+test('a contour says how its rays meet it', async () => {
+    const name = several.structures > 1 ? (await get(`/models/${several.id}`)).json().structures[1].name : undefined;
+    const query = name ? `structure=${encodeURIComponent(name)}` : '';
+    const [low, high] = await slicesOf(several.id, name), k = Math.floor((low + high) / 2);
+    for (const rays of [undefined, 16, 256]) {
+        const reply = await get(`/models/${several.id}/slices/${k}/contour?${query}${rays ? `&rays=${rays}` : ''}`);
+        assert.equal(reply.code, 200, reply.text);
+        const { ray_count: count, loops } = reply.json();
+        assert.equal(count, rays ?? 64);
+        assert.ok(loops.length > 0);
+        for (const loop of loops) {
+            if (name) assert.equal(loop.structure, name);
+            assert.equal(typeof loop.hole, 'boolean');
+            assert.equal(loop.centre.length, 3);
+            for (const list of [loop.rays, loop.in_out, loop.edges]) assert.equal(list.length, loop.points.length);
+            let turned = 0;
+            loop.edges.forEach((edge, i) => {
+                const next = (i + 1) % loop.edges.length, step = (loop.rays[next] - loop.rays[i] + count) % count;
+                assert.equal(step, { f: 1, b: count - 1 }[edge] ?? 0, edge);
+                assert.ok(['f', 'b', 'ui', 'uo', 'di', 'do'].includes(edge));
+                turned += edge === 'f' ? 1 : edge === 'b' ? -1 : 0;
+            });
+            assert.equal(turned, loop.points.length ? count : 0, 'once round');
+        }
+    }
+});
+
+test('slices are kept, compressed and refused like everything else', async () => {
+    const [low, high] = await slicesOf(model.id), base = `/models/${model.id}/slices/${low}`;
+    isProblem(await get(`/models/${model.id}/slices/${high + 1}.png`), 404);
+    if (low > 0) isProblem(await get(`/models/${model.id}/slices/${low - 1}/outline`), 404);
+    for (const bad of ['x', '-1', '1.5', '007', '99999', '']) isProblem(await get(`/models/${model.id}/slices/${bad}/outline`), 404);
+    for (const bad of ['-1', 'x', '', '1e3', '0x10', 'nan', 'inf', '1.2.3', '.', '%201', '2000000', '1'.repeat(40)])
+        isProblem(await get(`${base}/outline?tolerance=${bad}`), 400, /tolerance/);
+    for (const bad of ['0', '12', '2', '8192', '-8', 'x', '']) isProblem(await get(`${base}/contour?rays=${bad}`), 400, /rays/);
+    isProblem(await get(`${base}/outline?tolerance=1&tolerance=2`), 400, /twice/);
+    isProblem(await get(`${base}.png?structure=no%20such`), 404, /structure/);
+    isProblem(await get(`${base}.gif`), 404);
+    isProblem(await request('POST', `${base}.png`), 405);
+    for (const path of [`${base}.png`, `${base}/outline?tolerance=.5`, `${base}/contour`]) {
+        const first = await get(path), again = await get(path), head = await request('HEAD', path);
+        assert.match(first.headers.etag, /^"[0-9a-f]{32}"$/);
+        assert.ok(first.body.equals(again.body));
+        assert.equal(head.headers['content-length'], String(first.body.length));
+        assert.equal(head.headers.etag, first.headers.etag);
+        assert.equal((await get(path, { 'If-None-Match': first.headers.etag })).code, 304);
+        const packed = await get(path, { 'Accept-Encoding': 'gzip' });
+        if (path.endsWith('.png')) assert.ok(!('content-encoding' in packed.headers));
+        else assert.ok(gunzipSync(packed.body).equals(first.body));
+    }
+    const part = await get(`${base}.png`, { Range: 'bytes=0-7' });
+    assert.equal(part.code, 206);
+    assert.equal(part.body.length, 8);
+    assert.match((await get(`${base}.png?v=${model.hash}`)).headers['cache-control'], /immutable/);
 });
 
 test('the page has manifest and base shape inlined, and nothing in it ends a script early', async () => {

@@ -99,7 +99,7 @@ static void test_names(void) {
 
 /* axis z, iso, affine 2 3 4 on the diagonal, parameter 300, one structure. */
 static const uint8_t vector_header[] = {
-    0x89, 'L',  'T',  'H',  0x0D, 0x0A, 0x1A, 1,    61, /* magic, version, size of the body */
+    0x89, 'L',  'T',  'H',  0x0D, 0x0A, 0x1A, 2,    61, /* magic, version, size of the body */
     0x06,                                               /* axis 2, boundary 1 << 2, floats */
     0,    0,    0,    0x40, 0,    0,    0,    0,    0,  0, 0,    0,    0, 0, 0,    0,    /* 2 0 0 0 */
     0,    0,    0,    0,    0,    0,    0x40, 0x40, 0,  0, 0,    0,    0, 0, 0,    0,    /* 0 3 0 0 */
@@ -284,10 +284,10 @@ static void test_hostile_counts(void) {
     memcpy(body + 52, (uint8_t[]){0xFF, 0xFF, 0x03}, 3);
     memcpy(body + 55, vector_header + 9 + 53, size - 53);
     CHECK_EQ(parse_body(body, size + 2, &header), LATHE_ERR_FORMAT);
-    const uint8_t endless[] = {0x89, 'L', 'T', 'H', 0x0D, 0x0A, 0x1A, 1, 0xFF, 0xFF, 0xFF, 0xFF, 0x0F, 0};
+    const uint8_t endless[] = {0x89, 'L', 'T', 'H', 0x0D, 0x0A, 0x1A, 2, 0xFF, 0xFF, 0xFF, 0xFF, 0x0F, 0};
     lathe_reader reader = lathe__reader(endless, sizeof endless);
     CHECK_EQ(lathe__header_parse(&header, &reader), LATHE_ERR_LIMIT);
-    const uint8_t next[] = {0x89, 'L', 'T', 'H', 0x0D, 0x0A, 0x1A, 2};
+    const uint8_t next[] = {0x89, 'L', 'T', 'H', 0x0D, 0x0A, 0x1A, 3};
     reader = lathe__reader(next, sizeof next);
     CHECK_EQ(lathe__header_parse(&header, &reader), LATHE_ERR_UNSUPPORTED);
     for (size_t n = 1; n < 8; n++) {
@@ -333,7 +333,10 @@ static lathe_level_info stats_of(uint32_t structure, uint32_t level) {
                              .triangles = 200 * level,
                              .draco_bytes = level ? (uint64_t)1 << (30 + 2 * level) : 0,
                              .error_rms_mm = structure == 2 ? -1 : 1.5f / (float)(level + 1),
-                             .error_max_mm = 3.0f + (float)structure};
+                             .error_max_mm = 3.0f + (float)structure,
+                             .components_waiting = level < 2 ? structure : 0};
+    info.components = 7 + structure - info.components_waiting;
+    info.waiting_mm3 = info.components_waiting * 0.25;
     return info;
 }
 
@@ -389,10 +392,18 @@ static void check_description(const lathe_model *model) {
                   own->levels[n].vertices == want.vertices);
             CHECK(own->levels[n].triangles == want.triangles && own->levels[n].draco_bytes == want.draco_bytes);
             CHECK(own->levels[n].error_rms_mm == want.error_rms_mm && own->levels[n].error_max_mm == want.error_max_mm);
+            CHECK(own->levels[n].components == want.components && own->levels[n].components_waiting == want.components_waiting &&
+                  own->levels[n].waiting_mm3 == want.waiting_mm3);
             sums[n] += own->levels[n].polar_bytes;
         }
     }
     for (uint32_t n = 0; n < 3; n++) CHECK_EQ(sums[n], info->levels[n].polar_bytes);
+    /* Totals: structures with fewer levels stay at their last. */
+    CHECK_EQ(info->levels[0].components, 4 * 7);
+    CHECK_EQ(info->levels[0].components_waiting, 0 + 1 + 2 + 3);
+    CHECK_EQ(info->levels[2].components_waiting, 0 + 1 + 0 + 3);
+    CHECK(info->levels[0].waiting_mm3 == 1.5 && info->levels[2].waiting_mm3 == 1);
+    CHECK(info->keep_topology && info->caps);   /* bits of parameter 1 */
     CHECK_EQ(lathe_model_find(model, "Thalamus"), -1);
     CHECK(info->levels[0].error_rms_mm == 2 && info->levels[1].error_rms_mm == -1 && info->levels[2].error_max_mm == 7);
     CHECK(info->levels[2].rays == 32 && info->levels[2].draco_bytes == UINT64_C(1) << 34);

@@ -46,6 +46,7 @@ exits 2 bake x.json --label 1.5
 exits 2 bake x.json --labels 1,,2
 exits 2 bake x.json --axis w
 exits 2 bake x.json --boundary round
+exits 2 bake x.json --topology round
 exits 2 bake x.json --quiet=yes; says "takes no value"
 exits 2 export x.lathe; says "-o OUT is needed"
 exits 2 export x.lathe -o x.txt; says "stl, ply, glb or drc"
@@ -89,6 +90,12 @@ ok "info: the keys" json "$here/out" 'j.structures.every(s => typeof s.name === 
     typeof l.error_max_mm === "number" && typeof l.error_rms_mm === "number"))'
 ok "info: levels rise" json "$here/out" 'j.structures[0].levels.length >= 2 && j.structures[0].levels.every((l, i, all) => !i ||
     (l.triangles > all[i - 1].triangles && l.slices > all[i - 1].slices && l.error_rms_mm < all[i - 1].error_rms_mm))'
+exits 0 info --json "$here/edge.lathe"
+exits 0 bake "$here/values.json" --topology keep --no-draco -o "$here/keep.lathe"
+exits 0 verify "$here/keep.lathe" "$here/values.json"; prints "topology of every level compared"
+exits 0 info --json "$here/keep.lathe"
+ok "info: nothing waits where the topology is kept" json "$here/out" 'j.topology === "keep" &&
+    j.structures[0].levels.every(l => l.components > 0 && l.components_waiting === 0 && l.waiting_mm3 === 0)'
 exits 0 info --json "$here/edge.lathe"
 ok "info: errors that were not measured are null" json "$here/out" 'j.structures[0].levels.every(l => l.error_max_mm === null)'
 exits 0 info "$here/ball.lathe" --json; prints '"structures"'

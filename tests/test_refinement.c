@@ -259,8 +259,10 @@ static void levels_of_slices(void) {
         lathe_level_plan plan = {.slices = slices, .level_count = lathe__choose_levels(slices)};
         int32_t kept[2] = {slices / 3, slices / 2}, *before = NULL;
         uint32_t before_count = 0;
-        plan.kept = kept;
-        plan.kept_count = kept[0] < kept[1] ? 2 : 1;
+        uint8_t early[300] = {0};
+        uint32_t kept_count = kept[0] < kept[1] ? 2 : 1;
+        for (uint32_t k = 0; k < 2; k++) early[kept[k]] = (uint8_t)lathe__regular_level(&plan, kept[k]);
+        plan.early = early;
         CHECK(plan.level_count >= 2 && plan.level_count <= LATHE_MAX_LEVELS);
         for (uint32_t level = 0; level < plan.level_count; level++) {
             int32_t *list;
@@ -270,9 +272,9 @@ static void levels_of_slices(void) {
             for (uint32_t i = 0; i < count; i++) {
                 if (i && list[i] <= list[i - 1]) ascending = false;
                 if (found < before_count && before[found] == list[i]) found++;
-                for (uint32_t k = 0; k < plan.kept_count; k++) has_kept += list[i] == kept[k];
+                for (uint32_t k = 0; k < kept_count; k++) has_kept += list[i] == kept[k];
             }
-            if (!(CHECK(ascending) & CHECK_EQ(found, before_count) & CHECK_EQ(has_kept, plan.kept_count))) fprintf(stderr, "  %d slices, level %u\n", slices, level);
+            if (!(CHECK(ascending) & CHECK_EQ(found, before_count) & CHECK_EQ(has_kept, kept_count))) fprintf(stderr, "  %d slices, level %u\n", slices, level);
             before = list;
             before_count = count;
         }

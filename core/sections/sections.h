@@ -38,6 +38,12 @@ typedef struct lathe_ray_contour {
  * Arrays are the arena's. RANGE (rays, or neighbouring crossings more than one ray apart), MEMORY. */
 lathe_status lathe__make_ray_contour(lathe_ray_contour *out, lathe_arena *arena, const lathe_point *loop, uint32_t count,
                                      lathe_point centre, uint32_t rays, uint32_t turn);
+/* What that does: the loop turned back about the centre (the loop itself where turn is 0; else arena memory); the place of a crossing on
+ * the unturned loop, rounded to the lattice, and its distance from the centre. */
+lathe_status lathe__turn_loop(const lathe_point **out, lathe_arena *arena, const lathe_point *loop, uint32_t count, lathe_point centre,
+                              uint32_t turn);
+lathe_point lathe__crossing_point(int64_t *radius, const lathe_crossing *crossing, const lathe_point *loop, uint32_t count,
+                                  lathe_point centre);
 /* Unit vector of ray i, in double: for drawing and measuring. */
 void lathe__ray_vector(double out[2], uint32_t ray, uint32_t rays, uint32_t turn);
 
@@ -66,7 +72,7 @@ lathe_status lathe__tile_christiansen(lathe_tiling *out, lathe_arena *arena, con
 lathe_status lathe__tile_shortest(lathe_tiling *out, lathe_arena *arena, const lathe_point *a, uint32_t a_count,
                                   const lathe_point *b, uint32_t b_count, int32_t rise);       /* tile_shortest.c */
 /* Min-Lee's own: the right tree of a (towards b) against the left tree of b (towards a) [M 4.3-4.5], ambiguous cases decided by
- * geometry. Integer comparisons only. Both contours have the same number of rays (else RANGE). derivation.c */
+ * geometry. Integer comparisons only. Both contours have the same number of rays (else RANGE). tile_trees.c */
 lathe_status lathe__tile_trees(lathe_tiling *out, lathe_arena *arena, const lathe_ray_contour *a, const lathe_ray_contour *b);
 
 /* How good a tiling is. tiling_measure.c */

@@ -102,10 +102,11 @@ seed_archives() {                           # small archives, and their streams 
     local kind size footer
     mkdir -p build/corpus/fuzz_archive build/corpus/fuzz_delta
     [ -x "$LATHE_BIN" ] && [ -x "$LATHE_PHANTOM" ] || return
-    for kind in ball labels values; do
-        "$LATHE_PHANTOM" $kind build/corpus/$kind.json 14
+    for kind in ball labels values keep; do
+        "$LATHE_PHANTOM" ${kind/keep/values} build/corpus/$kind.json 14
         local options="--iso 100"
         [ $kind = labels ] && options="--labels all"
+        [ $kind = keep ] && options="--iso 100 --topology keep"
         # shellcheck disable=SC2086
         "$LATHE_BIN" bake build/corpus/$kind.json $options --quiet -o build/corpus/fuzz_archive/$kind
         size=$(stat -c %s build/corpus/fuzz_archive/$kind)
