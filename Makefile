@@ -31,7 +31,7 @@ FUZZERS := $(basename $(notdir $(wildcard tests/fuzz_*.c)))
 # The decoder. Linking it proves that it needs no volume, no ray casting on grey values and no file.
 WASM_SOURCES := $(addprefix core/,status.c arena.c ray.c crossing.c contour.c grammar.c tiling.c centre.c grid.c outline.c triangulate.c \
                   overlay.c tube.c builder.c level.c refinement.c mask.c mesh.c) \
-                $(addprefix codec/,range_decoder.c occupancy_model.c occupancy_decode.c base_shape.c base_decode.c \
+                $(addprefix codec/,range_decoder.c occupancy_model.c occupancy_decode.c base_shape.c base_decode.c radius_map.c radius_mesh.c \
                   structure_state.c structure_decode.c archive_parse.c crc32c.c decode.c) \
                 $(wildcard web/wasm/*.c)
 
@@ -150,7 +150,7 @@ demo: ## install what is missing, bake a brain and an atlas, serve them on http:
 
 # ---- tests -------------------------------------------------------------------------------------------------------------
 
-.PHONY: test test-programs sanitize sanitize-programs fuzz fuzzers bench
+.PHONY: test test-programs sanitize sanitize-programs fuzz fuzzers bench soak
 test: ## install what is missing, build, run every test; ends with "N passed, N failed"
 	@tests/scripts/setup.sh test
 	@tests/scripts/run_tests.sh
@@ -179,8 +179,12 @@ $(TABLES:%=$(B)/tests/bench/%): $(B)/tests/bench/%: $(B)/tests/bench/%.o $(LIBRA
 	@echo "  link  $@"
 	$(Q)$(CXX) $(LINK_MODE) $(LDFLAGS) -o $@ $^ $(LIBS)
 
+PAIRS ?= 1000000
+soak: $(B)/tests/soak ## random pairs of slices, PAIRS=1000000 of them: every guarantee, exact and coarse
+	@$< $(PAIRS)
+
 TEST_HELPERS := $(patsubst %.c,$(B)/%.o,$(wildcard tests/phantom.c))
-$(UNIT_TESTS:%=$(B)/tests/%): $(B)/tests/%: $(B)/tests/%.o $(TEST_HELPERS) $(SERVER_LIBRARY) $(LIBRARY)
+$(UNIT_TESTS:%=$(B)/tests/%) $(B)/tests/soak: $(B)/tests/%: $(B)/tests/%.o $(TEST_HELPERS) $(SERVER_LIBRARY) $(LIBRARY)
 	@echo "  link  $@"
 	$(Q)$(CXX) $(LINK_MODE) $(LDFLAGS) -o $@ $^ $(LIBS)
 $(FUZZERS:%=$(B)/tests/%): $(B)/tests/%: $(B)/tests/%.o $(TEST_HELPERS) $(LIBRARY)

@@ -1,6 +1,7 @@
 /* The records of the container as bytes: the counterpart of archive_parse.c. */
 #include "archive_write.h"
 #include "crc32c.h"
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -62,10 +63,27 @@ void lathe__emit_checksum(lathe_bytes *bytes, size_t start) {
 }
 
 /* NIfTI's transforms are floats: 48 bytes of the first kilobytes saved. */
-static bool fits_float(const double affine[3][4]) {
-    for (int i = 0; i < 12; i++)
-        if ((double)(float)affine[i / 4][i % 4] != affine[i / 4][i % 4]) return false;
-    return true;
+/* Most of an affine is zero or whole. */
+static uint32_t form_of(double v) {
+    if (v == 0) return LATHE_NUMBER_ZERO;
+    if (v == (double)(int32_t)(fabs(v) < 1e9 ? v : 0)) return LATHE_NUMBER_WHOLE;
+    return (double)(float)v == v ? LATHE_NUMBER_FLOAT : LATHE_NUMBER_DOUBLE;
+}
+
+static void emit_affine(lathe_bytes *bytes, const double affine[3][4]) {
+    for (int i = 0; i < 3; i++) {
+        uint32_t forms = 0;
+        for (int k = 0; k < 4; k++) forms |= form_of(affine[i][k]) << 2 * k;
+        lathe__emit_u8(bytes, (uint8_t)forms);
+        for (int k = 0; k < 4; k++) {
+            double v = affine[i][k];
+            switch (forms >> 2 * k & 3) {
+            case LATHE_NUMBER_WHOLE: lathe__emit_varint(bytes, lathe__zigzag((int64_t)v)); break;
+            case LATHE_NUMBER_FLOAT: lathe__emit_f32(bytes, (float)v); break;
+            case LATHE_NUMBER_DOUBLE: lathe__emit_f64(bytes, v); break;
+            }
+        }
+    }
 }
 
 static void emit_structure(lathe_bytes *bytes, const lathe_header_structure *s,
@@ -76,16 +94,8 @@ static void emit_structure(lathe_bytes *bytes, const lathe_header_structure *s,
 }
 
 static void emit_body(lathe_bytes *bytes, const lathe_header *header, uint32_t first, uint32_t count) {
-    bool is_double = !fits_float(header->affine);
-    lathe__emit_u8(bytes,
-                   (uint8_t)((unsigned)header->axis | (unsigned)header->boundary << 2 | (unsigned)is_double << 3));
-    for (int i = 0; i < 12; i++) {
-        double v = header->affine[i / 4][i % 4];
-        if (is_double)
-            lathe__emit_f64(bytes, v);
-        else
-            lathe__emit_f32(bytes, (float)v);
-    }
+    lathe__emit_u8(bytes, (uint8_t)((unsigned)header->axis | (unsigned)header->boundary << 2));
+    emit_affine(bytes, header->affine);
     lathe__emit_u8(bytes, (uint8_t)header->parameter_count);
     for (uint32_t i = 0; i < header->parameter_count; i++) lathe__emit_varint(bytes, header->parameters[i]);
     lathe__emit_varint(bytes, count);

@@ -74,8 +74,12 @@ typedef struct lathe_header_structure {
     int32_t origin[3], size[3]; /* as in lathe_mask: (u, v, w), margin of one pixel in u and v */
 } lathe_header_structure;
 
-/* Bits of parameter 1; parameter 0 is the fraction of border edges. */
-enum { LATHE_FLAG_CAPS = 1, LATHE_FLAG_KEEP = 2 };
+/* How a number of the affine is written. */
+enum { LATHE_NUMBER_ZERO, LATHE_NUMBER_WHOLE, LATHE_NUMBER_FLOAT, LATHE_NUMBER_DOUBLE };
+
+/* Bits of parameter 1; parameter 0 is the fraction of border edges. SHARED: structures are coded one after the other by one model,
+ * and none can be decoded alone. EXACT: every structure has slices, none is a radius map. */
+enum { LATHE_FLAG_CAPS = 1, LATHE_FLAG_KEEP = 2, LATHE_FLAG_SHARED = 4, LATHE_FLAG_EXACT = 8 };
 
 typedef struct lathe_header {
     lathe_axis axis;

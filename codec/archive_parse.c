@@ -146,9 +146,20 @@ static void parse_structure(lathe_header_structure *s, lathe_reader *body, const
     s->level_count = lathe__read_u8(body);
 }
 
-static void parse_affine(double affine[3][4], lathe_reader *body, bool is_double) {
-    for (int i = 0; i < 12; i++)
-        affine[i / 4][i % 4] = is_double ? lathe__read_f64(body) : (double)lathe__read_f32(body);
+static double parse_number(lathe_reader *body, uint32_t form) {
+    switch (form) {
+    case LATHE_NUMBER_WHOLE: return (double)lathe__unzigzag(lathe__read_varint(body));
+    case LATHE_NUMBER_FLOAT: return (double)lathe__read_f32(body);
+    case LATHE_NUMBER_DOUBLE: return lathe__read_f64(body);
+    default: return 0;
+    }
+}
+
+static void parse_affine(double affine[3][4], lathe_reader *body) {
+    for (int i = 0; i < 3; i++) {
+        uint32_t forms = lathe__read_u8(body);
+        for (int k = 0; k < 4; k++) affine[i][k] = parse_number(body, forms >> 2 * k & 3);
+    }
 }
 
 static void parse_structures(lathe_header *header, lathe_reader *body) {
@@ -174,10 +185,10 @@ static void parse_structures(lathe_header *header, lathe_reader *body) {
 
 static void parse_body(lathe_header *header, lathe_reader *body) {
     uint8_t flags = lathe__read_u8(body);
-    if (flags & 0xF0) lathe__reader_fail(body, LATHE_ERR_FORMAT, LATHE_FAULT("unknown header flags"));
+    if (flags & 0xF8) lathe__reader_fail(body, LATHE_ERR_FORMAT, LATHE_FAULT("unknown header flags"));
     header->axis = (lathe_axis)(flags & 3);
     header->boundary = (lathe_boundary)(flags >> 2 & 1);
-    parse_affine(header->affine, body, flags >> 3 & 1);
+    parse_affine(header->affine, body);
     header->parameter_count = lathe__read_u8(body);
     if (header->parameter_count > LATHE_MAX_PARAMETERS)
         lathe__reader_fail(body, LATHE_ERR_FORMAT, LATHE_FAULT("too many parameters"));

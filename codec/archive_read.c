@@ -1,6 +1,7 @@
 /* Reading archives: lathe_model. Opening checks the structure of the whole file (header, every level record's head,
  * footer, trailer; all sizes must meet); packets' checksums are checked by lathe_model_check and by decoders. Memory:
  * at most 24 times the header's and 5 times the footer's size, whatever the bytes say. */
+#include "restream.h"
 #include "archive_write.h"
 #include "crc32c.h"
 #include <errno.h>
@@ -217,6 +218,32 @@ static const uint8_t *structure_level(lathe_bytes *front, const lathe_model *mod
     return packet;
 }
 
+/* The same of a structure that was coded again to stand alone, whole. */
+static void emit_alone(lathe_bytes *out, const lathe_model *model, uint32_t structure, uint32_t level, const lathe_bytes *packet) {
+    lathe_header header = model->header;
+    header.parameters[1] &= ~(uint32_t)LATHE_FLAG_SHARED;
+    if (!header.parameters[1]) header.parameter_count = 1;
+    if (level == 0) lathe__emit_header(out, &header, structure, 1);
+    emit_structure_head(out, model, structure, level, (uint32_t)packet->size);
+    size_t start = out->size;
+    lathe__emit(out, packet->data, packet->size);
+    lathe__emit_checksum(out, start);
+}
+
+static lathe_status stream_alone(const lathe_model *model, uint32_t structure, uint32_t from, uint32_t to, lathe_sink sink, void *context) {
+    lathe_bytes packets[LATHE_MAX_LEVELS] = {{0}};
+    uint32_t count = model->header.structures[structure].level_count;
+    lathe_status status = lathe__restream(packets, model, structure, count);
+    for (uint32_t level = from; !status && level <= to && level < count; level++) {
+        lathe_bytes part = {0};
+        emit_alone(&part, model, structure, level, &packets[level]);
+        status = part.failed ? LATHE_ERR_MEMORY : sink(context, part.data, part.size) ? LATHE_ERR_IO : LATHE_OK;
+        lathe__bytes_free(&part);
+    }
+    for (int i = 0; i < LATHE_MAX_LEVELS; i++) lathe__bytes_free(&packets[i]);
+    return status;
+}
+
 static lathe_status stream_structure(const lathe_model *model, uint32_t structure, uint32_t from, uint32_t to,
                                      lathe_sink sink, void *context) {
     for (uint32_t level = from; level <= to && level < model->header.structures[structure].level_count; level++) {
@@ -280,6 +307,8 @@ static void fill_info(lathe_model *model) {
     uint32_t flags = model->header.parameter_count > 1 ? model->header.parameters[1] : 0;
     model->info.keep_topology = flags & LATHE_FLAG_KEEP;
     model->info.caps = flags & LATHE_FLAG_CAPS;
+    model->info.exact = flags & LATHE_FLAG_EXACT;
+    model->info.independent = !(flags & LATHE_FLAG_SHARED);
     model->info.levels = model->totals;
     sum_components(model);
     fill_polar_bytes(model);
@@ -402,6 +431,7 @@ void lathe_model_stream_range(const lathe_model *model, uint32_t from, uint32_t 
 lathe_status lathe_model_stream(const lathe_model *model, int64_t structure, uint32_t from, uint32_t to,
                                 lathe_sink sink, void *context) {
     if (structure >= model->header.structure_count) return LATHE_ERR_RANGE;
+    if (structure >= 0 && !model->info.independent) return stream_alone(model, (uint32_t)structure, from, to, sink, context);
     if (structure >= 0) return stream_structure(model, (uint32_t)structure, from, to, sink, context);
     size_t offset, size;
     lathe_model_stream_range(model, from, to, &offset, &size);

@@ -20,7 +20,8 @@ typedef struct bake {
     lathe_header header;
     lathe_baked_structure *baked;
     lathe_arena arena[2];
-    lathe_occupancy *trained;
+    lathe_models models;
+    lathe_structure_state *states;
     double done, total;        /* voxels, for progress */
     lathe_error *err;
 } bake;
@@ -69,16 +70,13 @@ static double voxel_mm3(const lathe_volume *volume) {
                 m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]));
 }
 
-static lathe_status encode(bake *b, lathe_baked_structure *baked, lathe_structure_state *state) {
-    grey_values grey = {.bake = b, .mask = &state->mask};
-    lathe__axis_frame(b->options->axis, grey.frame);
+static lathe_encode_source source_of(const bake *b, grey_values *grey, const lathe_mask *mask) {
+    *grey = (grey_values){.bake = b, .mask = mask};
+    lathe__axis_frame(b->options->axis, grey->frame);
     const double *spacing = b->volume->spacing;
-    double slice = spacing[grey.frame[2]];
-    lathe_encode_source source = {.slice_ratio = slice * slice / (spacing[grey.frame[0]] * spacing[grey.frame[1]]),
-                                  .value = grey_value, .context = &grey, .iso = b->options->iso};
-    lathe_status status = lathe__structure_encode(baked, state, b->arena, &b->trained, &source);
-    for (uint32_t level = 0; level < baked->level_count; level++) baked->levels[level].waiting_mm3 *= voxel_mm3(b->volume);
-    return status;
+    double slice = spacing[grey->frame[2]];
+    return (lathe_encode_source){.slice_ratio = slice * slice / (spacing[grey->frame[0]] * spacing[grey->frame[1]]),
+                                 .value = grey_value, .context = grey, .iso = b->options->iso};
 }
 
 /* Where the grey values cross iso on border edges, on average: one number for the whole structure. Rows and columns of every few
@@ -165,33 +163,66 @@ static lathe_status finish_levels(bake *b, lathe_structure_state *state, lathe_b
         if (!status && o->draco) status = draco_size(&info->draco_bytes, &mesh, &transform);
         lathe_mesh_free(&mesh);
         b->done += voxels / baked->level_count;
-        if (!status) status = tell(b, o->measure ? "building and measuring" : "building", b->done / b->total);
+        if (!status) status = tell(b, o->measure ? "building and measuring" : "building", 0.4 + 0.6 * b->done / b->total);
     }
     lathe__reference_free(&reference);
     return status;
 }
 
-static lathe_status bake_structure(bake *b, size_t index) {
-    lathe_structure_state state = {.level = -1};
+/* ---- stages: each goes over all structures ---- */
+
+static lathe_status explain(const bake *b, size_t index, const char *what, lathe_status status) {
+    if (status && b->err && !b->err->text[0])
+        lathe_fail(b->err, status, "%s: %s: %s", b->header.structures[index].name, what, lathe_status_name(status));
+    return status;
+}
+
+static lathe_status plan_structure(bake *b, size_t index) {
+    lathe_structure_state *state = &b->states[index];
     lathe_baked_structure *baked = &b->baked[index];
     lathe_header_structure *h = &b->header.structures[index];
-    double voxels = b->options->structure_count ? 1 : b->total;
-    lathe_status status = extract(b, index, &state.mask);
-    if (!status) {
-        state.fraction = mean_fraction(b, &state.mask);
-        if (!b->options->structure_count) b->header.parameters[0] = (uint32_t)state.fraction;
-        state.flags = b->header.parameters[1];
-        status = encode(b, baked, &state);
-        if (status) lathe_fail(b->err, status, "%s: encoding: %s", h->name, lathe_status_name(status));
+    grey_values grey;
+    lathe_status status = extract(b, index, &state->mask);
+    if (status) return explain(b, index, "its region", status);
+    state->level = -1;
+    state->fraction = mean_fraction(b, &state->mask);
+    if (!b->options->structure_count) b->header.parameters[0] = (uint32_t)state->fraction;
+    state->flags = b->header.parameters[1];
+    lathe_encode_source source = source_of(b, &grey, &state->mask);
+    status = lathe__structure_plan(baked, state, b->arena, &source);
+    if (!status) status = lathe__choose_radii(baked, state, b->arena, b->volume, b->options->axis, b->boundary, &source);
+    for (uint32_t level = 0; level < baked->level_count; level++) baked->levels[level].waiting_mm3 *= voxel_mm3(b->volume);
+    h->level_count = (uint8_t)baked->level_count;
+    memcpy(h->origin, state->mask.origin, sizeof h->origin);
+    memcpy(h->size, state->mask.size, sizeof h->size);
+    return explain(b, index, "planning", status);
+}
+
+static lathe_status encode_structure(bake *b, size_t index, uint32_t level) {
+    lathe_structure_state *state = &b->states[index];
+    grey_values grey;
+    if (level >= b->baked[index].level_count) return LATHE_OK;
+    lathe_encode_source source = source_of(b, &grey, &state->mask);
+    return explain(b, index, "encoding", lathe__structure_encode_level(&b->baked[index], state, b->arena, &b->models, level, &source));
+}
+
+static lathe_status bake_structures(bake *b) {
+    lathe_status status = LATHE_OK;
+    uint32_t levels = 0;
+    for (size_t i = 0; !status && i < b->count; i++) {
+        status = plan_structure(b, i);
+        if (b->baked[i].level_count > levels) levels = b->baked[i].level_count;
+        if (!status) status = tell(b, "planning", 0.2 * (double)(i + 1) / (double)b->count);
     }
-    if (!status) {
-        h->level_count = (uint8_t)baked->level_count;
-        memcpy(h->origin, state.mask.origin, sizeof h->origin);
-        memcpy(h->size, state.mask.size, sizeof h->size);
-        status = finish_levels(b, &state, baked, voxels);
-        if (status && b->err && !b->err->text[0]) lathe_fail(b->err, status, "%s: building its levels: %s", h->name, lathe_status_name(status));
+    if (!status) lathe__models_start(&b->models, &b->header);
+    for (uint32_t level = 0; !status && level < levels; level++) {
+        for (size_t i = 0; !status && i < b->count; i++) status = encode_structure(b, i, level);
+        if (!status) status = tell(b, "encoding", 0.2 + 0.2 * (level + 1) / levels);
     }
-    lathe__state_free(&state);
+    for (size_t i = 0; !status && i < b->count; i++) {
+        status = explain(b, i, "building its levels", finish_levels(b, &b->states[i], &b->baked[i], 1));
+        lathe__state_free(&b->states[i]);
+    }
     return status;
 }
 
@@ -269,13 +300,15 @@ static lathe_status prepare(bake *b) {
     b->header.boundary = b->boundary;
     memcpy(b->header.affine, b->volume->affine, sizeof b->header.affine);
     b->header.parameters[0] = LATHE_FRACTION_ONE / 2;
-    b->header.parameters[1] = (o->keep_topology ? LATHE_FLAG_KEEP : 0) |
+    b->header.parameters[1] = (o->keep_topology ? LATHE_FLAG_KEEP : 0) | (o->exact ? LATHE_FLAG_EXACT : 0) |
+                              (b->count > 1 && !o->independent ? LATHE_FLAG_SHARED : 0) |
                               (b->boundary == LATHE_BOUNDARY_ISO && !o->structure_count && !o->flat_caps ? LATHE_FLAG_CAPS : 0);
     b->header.parameter_count = b->header.parameters[1] ? 2 : 1;
     b->header.structure_count = (uint32_t)b->count;
     b->header.structures = calloc(b->count, sizeof *b->header.structures);
     b->baked = calloc(b->count, sizeof *b->baked);
-    if (!b->header.structures || !b->baked) {
+    b->states = calloc(b->count, sizeof *b->states);
+    if (!b->header.structures || !b->baked || !b->states) {
         lathe_fail(b->err, LATHE_ERR_MEMORY, "out of memory");
         return LATHE_ERR_MEMORY;
     }
@@ -296,15 +329,17 @@ lathe_status lathe_bake(const lathe_volume *volume, const lathe_bake_options *op
     bake b = {.volume = volume, .options = options, .err = err};
     if (err) err->text[0] = '\0';
     lathe_status status = prepare(&b);
-    for (size_t i = 0; !status && i < b.count; i++) status = bake_structure(&b, i);
+    if (!status) status = bake_structures(&b);
     if (!status) status = tell(&b, "writing", 1);
     if (!status) status = write_archive(&b, sink, context);
     if (status && err && !err->text[0]) lathe_fail(err, status, "writing the archive: %s", lathe_status_name(status));
     for (size_t i = 0; b.baked && i < b.count; i++) lathe__baked_free(&b.baked[i]);
+    for (size_t i = 0; b.states && i < b.count; i++) lathe__state_free(&b.states[i]);
+    free(b.states);
     free(b.baked);
     free(b.header.structures);
     free(b.boxes);
-    lathe__occupancy_free(&b.trained);
+    lathe__occupancy_free(&b.models.occupancy);
     lathe__arena_free(&b.arena[0]);
     lathe__arena_free(&b.arena[1]);
     return status;

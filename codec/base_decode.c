@@ -44,9 +44,7 @@ static bool get_star(lathe_star *star, lathe_arena *arena, lathe_range_decoder *
 }
 
 lathe_status lathe__base_decode(lathe_star_slice *slices, uint32_t count, lathe_arena *arena, lathe_range_decoder *d,
-                                const lathe_mask *frame) {
-    lathe_number_model m[LATHE_BASE_MODELS];
-    lathe__base_models(m);
+                                const lathe_mask *frame, lathe_number_model m[LATHE_BASE_MODELS]) {
     for (uint32_t s = 0; s < count; s++) {
         const lathe_star_slice *before = s ? &slices[s - 1] : NULL;
         int32_t loops = lathe__get_number(d, &m[LATHE_BASE_LOOPS]) + (before ? (int32_t)before->count : 1);

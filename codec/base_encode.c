@@ -34,9 +34,8 @@ static void put_star(lathe_range_encoder *e, lathe_number_model *m, const lathe_
                    star->radius[i] - lathe__predict_radius(star, parent, i, 16));
 }
 
-lathe_status lathe__base_encode(lathe_range_encoder *e, const lathe_star_slice *slices, uint32_t count, const lathe_mask *frame) {
-    lathe_number_model m[LATHE_BASE_MODELS];
-    lathe__base_models(m);
+lathe_status lathe__base_encode(lathe_range_encoder *e, const lathe_star_slice *slices, uint32_t count, const lathe_mask *frame,
+                                lathe_number_model m[LATHE_BASE_MODELS]) {
     for (uint32_t s = 0; s < count; s++) {
         const lathe_star_slice *before = s ? &slices[s - 1] : NULL;
         lathe__put_number(e, &m[LATHE_BASE_LOOPS], (int32_t)slices[s].count - (before ? (int32_t)before->count : 1));

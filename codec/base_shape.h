@@ -48,10 +48,11 @@ void lathe__base_models(lathe_number_model models[LATHE_BASE_MODELS]);
 /* What a radius is predicted to be: the star it continues tells, or the ray before. */
 int32_t lathe__predict_radius(const lathe_star *star, const lathe_star *parent, uint32_t ray, int32_t start);
 
-lathe_status lathe__base_encode(lathe_range_encoder *e, const lathe_star_slice *slices, uint32_t count, const lathe_mask *frame);
+lathe_status lathe__base_encode(lathe_range_encoder *e, const lathe_star_slice *slices, uint32_t count, const lathe_mask *frame,
+                                lathe_number_model models[LATHE_BASE_MODELS]);
 /* Arena memory. FORMAT if the bytes end long before the stars do. frame: only its size is used. */
 lathe_status lathe__base_decode(lathe_star_slice *slices, uint32_t count, lathe_arena *arena, lathe_range_decoder *d,
-                                const lathe_mask *frame);
+                                const lathe_mask *frame, lathe_number_model models[LATHE_BASE_MODELS]);
 
 /* base_fit.c (encoder): the stars of a slice's loops: the large ones, pruned until they are disjoint. Arena memory. */
 lathe_status lathe__base_fit(lathe_star_slice *out, lathe_arena *arena, const lathe_outline *loops, const lathe_star_slice *before,

@@ -4,6 +4,9 @@
 #include "lathe_codec.h"
 #include "structure_state.h"
 
+/* restream.h, which is not in the small decoder. */
+const lathe_structure_state *lathe__decoder_state(const lathe_decoder *d, uint32_t structure);
+
 struct lathe_decoder {
     uint8_t *bytes;
     size_t size, capacity, used;
@@ -13,7 +16,7 @@ struct lathe_decoder {
     uint32_t next_packet;      /* of the current level record */
     uint32_t next_structure;
     lathe_structure_state *states;
-    lathe_occupancy *trained;  /* what every structure's coder starts from */
+    lathe_models models;
     lathe_transform *transforms;
     lathe_arena arena[2];
     lathe_mesh mesh;           /* of mesh_of at its level, if mesh_level >= 0 */
@@ -39,7 +42,7 @@ void lathe_decoder_close(lathe_decoder **decoder) {
     if (!decoder || !*decoder) return;
     lathe_decoder *d = *decoder;
     for (uint32_t i = 0; d->states && i < d->header.structure_count; i++) lathe__state_free(&d->states[i]);
-    lathe__occupancy_free(&d->trained);
+    lathe__occupancy_free(&d->models.occupancy);
     free(d->states);
     free(d->transforms);
     free(d->bytes);
@@ -83,6 +86,7 @@ static lathe_status start_structures(lathe_decoder *d) {
     d->states = calloc(n, sizeof *d->states);
     d->transforms = calloc(n, sizeof *d->transforms);
     if (!d->states || !d->transforms) return LATHE_ERR_MEMORY;
+    lathe__models_start(&d->models, &d->header);
     for (uint32_t i = 0; i < n; i++) {
         const lathe_header_structure *h = &d->header.structures[i];
         lathe_structure_state *s = &d->states[i];
@@ -142,7 +146,7 @@ lathe_status lathe_decoder_step(lathe_decoder *d, lathe_step *step) {
     uint32_t s = d->next_structure++;
     lathe_structure_state *state = &d->states[s];
     const char *fault = LATHE_FAULT("");
-    status = lathe__structure_decode(state, &d->arena[0], &d->trained, d->head.level, payload, size, &fault);
+    status = lathe__structure_decode(state, &d->arena[0], &d->models, d->head.level, payload, size, &fault);
     lathe__arena_reset(&d->arena[0]);
     if (status) return fail(d, status, fault);
     d->mesh_level = -1;
@@ -197,3 +201,5 @@ const char *lathe_decoder_error(const lathe_decoder *d) {
     if (!d->failure) return "";
     return *d->fault ? d->fault : lathe_status_name(d->failure);
 }
+
+const lathe_structure_state *lathe__decoder_state(const lathe_decoder *d, uint32_t structure) { return &d->states[structure]; }

@@ -71,6 +71,8 @@ typedef struct lathe_model_info {
     double iso;                    /* NaN for labels */
     bool keep_topology;            /* every level has the topology of the last */
     bool caps;                     /* caps of the last level have coded shapes */
+    bool exact;                    /* no structure is a radius map */
+    bool independent;              /* each structure can be decoded alone */
     /* Of the whole model at each level: area-weighted RMS, largest max (negative: not measured), and totals. */
     const lathe_level_info *levels;
 } lathe_model_info;
@@ -118,6 +120,8 @@ typedef struct lathe_bake_options {
     const lathe_bake_structure *structures; size_t structure_count;   /* labels to bake; none: the threshold */
     const char *name;              /* of the model */
     bool keep_topology;            /* every level gets the topology of the last, at the price of more bytes at first */
+    bool exact;                    /* slices for every structure, never a radius map (within 0.24 voxel, for fewer bytes) */
+    bool independent;              /* each structure can be decoded alone, for about an eighth more bytes */
     bool flat_caps;                /* caps rise half a voxel instead of following the grey values */
     bool measure;                  /* errors in mm (mesh against isosurface) */
     size_t samples;                /* per surface and level, shared over structures by area; 0: default */

@@ -9,12 +9,15 @@
 typedef struct lathe_known {
     const uint64_t *below, *above;      /* nearest known slices on either side */
     int32_t gap_below, gap_above;
+    int32_t estimate;                   /* 0: above is a slice; 1: it is an estimate of this very slice; 2: of one farther up */
 } lathe_known;
 
 typedef struct lathe_occupancy lathe_occupancy;    /* adaptive state; one per structure, kept over its levels */
 lathe_status lathe__occupancy_new(lathe_occupancy **out, int32_t width, int32_t height);   /* pixels, margin included */
 /* A fresh state beside one that has not coded yet: `from` is only a template, whose start-up training (1.4 ms) is saved. */
 lathe_status lathe__occupancy_copy(lathe_occupancy **out, const lathe_occupancy *from, int32_t width, int32_t height);
+/* The size of the slices to come. What was learned stays. */
+lathe_status lathe__occupancy_frame(lathe_occupancy *state, int32_t width, int32_t height);
 void lathe__occupancy_free(lathe_occupancy **state);
 lathe_status lathe__occupancy_encode(lathe_occupancy *state, lathe_range_encoder *e, const uint64_t *slice,
                                      const lathe_known *known);

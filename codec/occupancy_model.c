@@ -21,7 +21,7 @@ enum {
 enum {
     INPUTS = 6,
     SLOT_BITS_TRAINED = 17, SLOT_BITS_MAX = 20,   /* all contexts share one table: 512 KB, 1 MB or 4 MB */
-    MODES = 6,                 /* 0: no slice known, 1: one side, 2..5: both, gap 1, 2, 4, 8 and more */
+    MODES = 8,                 /* 0: no slice known, 1: one side, 2..5: both, gap 1, 2, 4, 8 and more; 6, 7: an estimate above */
     SEEN_CLASSES = 8,
     CENTRE = 4,                /* bit of the pixel itself in a window */
     LOGIT_ONE = 256, LOGIT_MAX = 12 * LOGIT_ONE - 1,
@@ -261,6 +261,7 @@ static void code_row(lathe_occupancy *s, const lathe_bit_coder *coder, const uin
 }
 
 static uint32_t mode_of(const lathe_known *known) {
+    if (known->estimate) return known->estimate == 1 ? 6 : 7;
     if (!known->below && !known->above) return 0;
     if (!known->below || !known->above) return 1;
     int32_t gap = known->gap_below < known->gap_above ? known->gap_below : known->gap_above;
@@ -357,12 +358,12 @@ static int say(void *coder, uint32_t p1, int bit) {
 
 static void code_blob(lathe_occupancy *s, uint64_t bits[BLOB_SLICES][BLOB]) {
     for (int32_t w = 0; w < BLOB_SLICES; w += 8) {
-        lathe_known known = {w ? bits[w - 8] : NULL, NULL, 8, 0};
+        lathe_known known = {.below = w ? bits[w - 8] : NULL, .gap_below = 8};
         lathe__occupancy_walk(s, &(lathe_bit_coder){say, NULL, bits[w]}, NULL, &known);
     }
     for (int32_t gap = 4; gap >= 1; gap /= 2)
         for (int32_t w = gap; w < BLOB_SLICES; w += 2 * gap) {
-            lathe_known known = {bits[w - gap], bits[w + gap], gap, gap};
+            lathe_known known = {bits[w - gap], bits[w + gap], gap, gap, 0};
             lathe__occupancy_walk(s, &(lathe_bit_coder){say, NULL, bits[w]}, NULL, &known);
         }
 }
@@ -382,23 +383,39 @@ static lathe_status train(lathe_occupancy *s) {
 
 /* Large slices have more contexts; small structures come by the hundred. */
 static int32_t slot_bits_of(int32_t width, int32_t height) {
-    int32_t area = width * height;
+    int64_t area = (int64_t)width * height;
     return area <= 64 * 64 ? SLOT_BITS_TRAINED : area <= 128 * 128 ? 18 : SLOT_BITS_MAX;
 }
 
 static lathe_status allocate(lathe_occupancy **out, int32_t width, int32_t height, int32_t slot_bits) {
-    size_t words = (size_t)(width + 63) / 64 + 2;
     lathe_occupancy *s = malloc(sizeof *s + sizeof(slot) * ((size_t)1 << slot_bits));
     if (!s) return LATHE_ERR_MEMORY;
-    *s = (lathe_occupancy){.width = width, .height = height, .row_words = (int32_t)words - 2, .slot_bits = slot_bits};
-    s->words = calloc(words, sizeof *s->words);
-    s->calm[0] = calloc(2 * words, sizeof *s->calm[0]);
-    if (!s->words || !s->calm[0]) {
-        lathe__occupancy_free(&s);
+    *s = (lathe_occupancy){.slot_bits = slot_bits};
+    lathe_status status = lathe__occupancy_frame(s, width, height);
+    if (status) lathe__occupancy_free(&s);
+    else *out = s;
+    return status;
+}
+
+lathe_status lathe__occupancy_frame(lathe_occupancy *s, int32_t width, int32_t height) {
+    if (s->width == width && s->height == height) return LATHE_OK;
+    if (width < 1 || height < 1 || width > LATHE_MAX_DIM + 2 || height > LATHE_MAX_DIM + 2) return LATHE_ERR_RANGE;
+    size_t words = (size_t)(width + 63) / 64 + 2;
+    lines *line = calloc(words, sizeof *line);
+    uint64_t *calm = calloc(2 * words, sizeof *calm);
+    if (!line || !calm) {
+        free(line);
+        free(calm);
         return LATHE_ERR_MEMORY;
     }
-    s->calm[1] = s->calm[0] + words;
-    *out = s;
+    free(s->words);
+    free(s->calm[0]);
+    s->words = line;
+    s->calm[0] = calm;
+    s->calm[1] = calm + words;
+    s->width = width;
+    s->height = height;
+    s->row_words = (int32_t)words - 2;
     return LATHE_OK;
 }
 
@@ -418,7 +435,6 @@ static void copy_slots(lathe_occupancy *s, const lathe_occupancy *from) {
 }
 
 lathe_status lathe__occupancy_copy(lathe_occupancy **out, const lathe_occupancy *from, int32_t width, int32_t height) {
-    if (width < 1 || height < 1 || width > LATHE_MAX_DIM + 2 || height > LATHE_MAX_DIM + 2) return LATHE_ERR_RANGE;
     lathe_occupancy *s;
     lathe_status status = allocate(&s, width, height, slot_bits_of(width, height));
     if (status != LATHE_OK) return status;

@@ -25,14 +25,16 @@ static uint8_t *read_steps(uint32_t count, lathe_range_decoder *d, uint16_t star
     return steps;
 }
 
-static lathe_status decode_stars(lathe_structure_state *state, lathe_range_decoder *d) {
+static lathe_status decode_stars(lathe_structure_state *state, lathe_range_decoder *d, lathe_models *models) {
+    lathe_number_model own[LATHE_BASE_MODELS], *base = models->base;
+    if (!(state->flags & LATHE_FLAG_SHARED)) lathe__base_models(base = own);
     int32_t *slices;
     uint32_t count;
     lathe_status status = lathe__level_slices(&slices, &count, &state->arena, &state->plan, 0);
     if (status) return status;
     state->base = LATHE_NEW(&state->arena, lathe_star_slice, count);
     if (!state->base) return LATHE_ERR_MEMORY;
-    status = lathe__base_decode(state->base, count, &state->arena, d, &state->mask);
+    status = lathe__base_decode(state->base, count, &state->arena, d, &state->mask, base);
     if (!status && !stars_fit(state, count)) status = LATHE_ERR_FORMAT;
     return status;
 }
@@ -49,12 +51,13 @@ static lathe_status keep_caps(lathe_structure_state *state, const lathe_range_de
     return LATHE_OK;
 }
 
-static lathe_status decode_slices(lathe_structure_state *state, lathe_arena *scratch, lathe_occupancy **trained, uint32_t level,
+static lathe_status decode_slices(lathe_structure_state *state, lathe_arena *scratch, lathe_models *models, uint32_t level,
                                   lathe_range_decoder *d) {
     if (level == lathe__first_exact(state)) {
         lathe_mask frame = state->mask;
-        lathe_status status = lathe__mask_new(&state->mask, frame.size, frame.origin);
-        if (!status) status = lathe__state_start_occupancy(state, trained);
+        lathe_status status = level ? lathe__state_estimate(state, scratch) : LATHE_OK;
+        if (!status) status = lathe__mask_new(&state->mask, frame.size, frame.origin);
+        if (!status) status = lathe__state_start_occupancy(state, models);
         if (status) return status;
         lathe__arena_free(&state->arena);
         state->base = NULL;
@@ -63,6 +66,7 @@ static lathe_status decode_slices(lathe_structure_state *state, lathe_arena *scr
     int32_t *shown;
     uint32_t count;
     lathe_status status = lathe__level_slices(&shown, &count, scratch, &state->plan, level);
+    if (!status) status = lathe__occupancy_frame(state->occupancy, state->mask.size[0], state->mask.size[1]);
     if (!status && state->flags & LATHE_FLAG_KEEP) {
         free(state->finer);
         state->finer = read_steps(count, d, LATHE_NUMBER_START, state->plan.level_count - 1 - level);
@@ -73,29 +77,50 @@ static lathe_status decode_slices(lathe_structure_state *state, lathe_arena *scr
         status = lathe__occupancy_decode(state->occupancy, d, lathe__mask_slice(&state->mask, list[i].slice), &list[i].known);
         if (d->overrun > 8) status = LATHE_ERR_FORMAT;
     }
+    lathe__mask_free(&state->estimate);
     if (level + 1 < state->plan.level_count) return status;
-    lathe__occupancy_free(&state->occupancy);
+    lathe__state_drop_occupancy(state);
     return status || !(state->flags & LATHE_FLAG_CAPS) ? status : keep_caps(state, d);
 }
 
-lathe_status lathe__structure_decode(lathe_structure_state *state, lathe_arena *scratch, lathe_occupancy **trained, uint32_t level,
+static int32_t get_number(void *coder, lathe_number_model *model, int32_t number) {
+    (void)number;
+    return lathe__get_number(coder, model);
+}
+
+static lathe_status decode_radii(lathe_structure_state *state, lathe_range_decoder *d, uint32_t level) {
+    lathe_number_coder coder = {get_number, d, NULL};
+    lathe_status status = LATHE_OK;
+    if (!level) {
+        state->radii = LATHE_NEW(&state->arena, lathe_radius_map, 1);
+        status = state->radii ? lathe__radius_head(state->radii, state, &state->arena, &coder) : LATHE_ERR_MEMORY;
+    }
+    if (!status) status = lathe__radius_walk(state->radii, level, &coder);
+    return !status && d->overrun > 8 ? LATHE_ERR_FORMAT : status;
+}
+
+lathe_status lathe__structure_decode(lathe_structure_state *state, lathe_arena *scratch, lathe_models *models, uint32_t level,
                                      const uint8_t *payload, size_t size, const char **fault) {
     *fault = LATHE_FAULT("levels out of order");
     if (state->level + 1 != (int32_t)level || level >= state->plan.level_count) return LATHE_ERR_FORMAT;
     lathe_range_decoder d;
     lathe__decoder_start(&d, payload, size);
     lathe_status status;
-    if (level == 0) {
+    bool radii = level ? state->radii != NULL : !(state->flags & LATHE_FLAG_EXACT) && lathe__decode_bit(&d, LATHE_RADIUS_CHANCE);
+    if (level == 0 && !radii) {
         state->plan.early = read_steps((uint32_t)state->plan.slices, &d, LATHE_EARLY_START, LATHE_MAX_LEVELS);
         if (!state->plan.early) return LATHE_ERR_MEMORY;
         state->exact_base = state->flags & LATHE_FLAG_KEEP && lathe__decode_bit(&d, LATHE_NUMBER_START);
     }
-    if (level < lathe__first_exact(state)) {
+    if (radii) {
+        *fault = LATHE_FAULT("radius map");
+        status = decode_radii(state, &d, level);
+    } else if (level < lathe__first_exact(state)) {
         *fault = LATHE_FAULT("base shape: stars");
-        status = decode_stars(state, &d);
+        status = decode_stars(state, &d, models);
     } else {
         *fault = LATHE_FAULT("slices: the packet is damaged or ends before them");
-        status = decode_slices(state, scratch, trained, level, &d);
+        status = decode_slices(state, scratch, models, level, &d);
         lathe__arena_reset(scratch);
     }
     if (!status) state->level = (int32_t)level;

@@ -40,7 +40,7 @@ static void put_steps(lathe_range_encoder *e, const uint8_t *steps, uint32_t cou
 
 /* ---- level 0 ---- */
 
-static lathe_status fit_stars(lathe_structure_state *state, lathe_arena *scratch) {
+lathe_status lathe__fit_stars(lathe_structure_state *state, lathe_arena *scratch) {
     int32_t *slices, stride = lathe__level_stride(&state->plan, 0);
     uint32_t count;
     lathe__arena_free(&state->arena);
@@ -67,7 +67,7 @@ static lathe_status fit_stars(lathe_structure_state *state, lathe_arena *scratch
 static lathe_status choose_base(lathe_structure_state *state, lathe_arena arena[2]) {
     lathe_topology all;
     lathe_status status = lathe__mask_topology(&all, &state->mask, NULL);
-    if (!status) status = fit_stars(state, &arena[0]);
+    if (!status) status = lathe__fit_stars(state, &arena[0]);
     lathe_mesh mesh = {0};
     lathe_surface_counts counts;
     uint32_t shown;
@@ -86,7 +86,7 @@ static lathe_status choose_base(lathe_structure_state *state, lathe_arena arena[
 static lathe_status choose_plan(lathe_structure_state *state, lathe_arena arena[2], const lathe_encode_source *source) {
     bool keep = state->flags & LATHE_FLAG_KEEP;
     lathe_status status = lathe__begin_early(state, keep ? 0 : source->slice_ratio);
-    if (status || !keep) return status ? status : fit_stars(state, &arena[0]);
+    if (status || !keep) return status ? status : lathe__fit_stars(state, &arena[0]);
     status = choose_base(state, arena);   /* with few slices; then with as many as a level of slices needs */
     if (!status) status = lathe__keep_slices(state);
     return status || !state->exact_base ? status : choose_base(state, arena);
@@ -105,6 +105,7 @@ static lathe_status encode_slices(lathe_baked_structure *out, lathe_structure_st
         if (!status) status = lathe__level_slices(&shown, &count, &arena[0], &state->plan, level);
         if (!status) put_steps(e, out->finer[level], count, LATHE_NUMBER_START);
     }
+    if (!status) status = lathe__occupancy_frame(state->occupancy, state->mask.size[0], state->mask.size[1]);
     if (!status) status = lathe__new_slices(&list, &count, &arena[0], state, level);
     for (uint32_t i = 0; !status && i < count; i++)
         status = lathe__occupancy_encode(state->occupancy, e, lathe__mask_slice(&state->mask, list[i].slice), &list[i].known);
@@ -112,39 +113,62 @@ static lathe_status encode_slices(lathe_baked_structure *out, lathe_structure_st
     return status;
 }
 
-static lathe_status encode_level(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2], uint32_t level,
-                                 const lathe_encode_source *source) {
+static int32_t put_number(void *coder, lathe_number_model *model, int32_t number) {
+    lathe__put_number(coder, model, number);
+    return number;
+}
+
+static lathe_status encode_radii(lathe_range_encoder *e, lathe_structure_state *state, const lathe_radius_map *truth, uint32_t level) {
+    lathe_number_coder coder = {put_number, e, truth};
+    lathe_status status = level ? LATHE_OK : lathe__radius_head(state->radii, state, &state->arena, &coder);
+    return status ? status : lathe__radius_walk(state->radii, level, &coder);
+}
+
+static lathe_status encode_stars(lathe_range_encoder *e, lathe_structure_state *state, lathe_models *models) {
+    lathe_number_model own[LATHE_BASE_MODELS], *base = models->base;
+    int32_t *slices;
+    uint32_t count;
+    if (!(state->flags & LATHE_FLAG_SHARED)) lathe__base_models(base = own);
+    lathe_status status = lathe__level_slices(&slices, &count, &state->arena, &state->plan, 0);
+    return status ? status : lathe__base_encode(e, state->base, count, &state->mask, base);
+}
+
+lathe_status lathe__structure_encode_level(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2],
+                                           lathe_models *models, uint32_t level, const lathe_encode_source *source) {
     lathe_range_encoder e;
-    lathe__encoder_start(&e);
     lathe_status status = LATHE_OK;
+    lathe__encoder_start(&e);
+    if (level == 0 && !(state->flags & LATHE_FLAG_EXACT)) lathe__encode_bit(&e, LATHE_RADIUS_CHANCE, state->radii != NULL);
+    if (state->radii) {
+        status = encode_radii(&e, state, out->truth, level);
+        lathe_status coded = append_coded(&out->packets[level], &e);
+        return status ? status : coded;
+    }
     if (level == 0) {
         put_steps(&e, state->plan.early, (uint32_t)state->plan.slices, LATHE_EARLY_START);
         if (state->flags & LATHE_FLAG_KEEP) lathe__encode_bit(&e, LATHE_NUMBER_START, state->exact_base);
     }
-    if (level < lathe__first_exact(state)) {
-        int32_t *slices;
-        uint32_t count;
-        status = lathe__level_slices(&slices, &count, &state->arena, &state->plan, 0);
-        if (!status) status = lathe__base_encode(&e, state->base, count, &state->mask);
-    } else {
-        status = encode_slices(out, state, arena, &e, level);
+    if (level == lathe__first_exact(state)) {
+        if (level) status = lathe__state_estimate(state, &arena[0]);
+        lathe__arena_reset(&arena[0]);
+        if (!status) status = lathe__state_start_occupancy(state, models);
     }
+    if (!status) status = level < lathe__first_exact(state) ? encode_stars(&e, state, models) : encode_slices(out, state, arena, &e, level);
+    if (level) lathe__mask_free(&state->estimate);
     if (!status && level + 1 == out->level_count && state->flags & LATHE_FLAG_CAPS) {
         status = lathe__choose_caps(&out->caps, state, arena, source);
         if (!status) lathe__encode_caps(&e, &out->caps);
     }
     lathe_status appended = append_coded(&out->packets[level], &e);
+    if (level + 1 == out->level_count) lathe__state_drop_occupancy(state);
     return status ? status : appended;
 }
 
-lathe_status lathe__structure_encode(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2],
-                                     lathe_occupancy **trained, const lathe_encode_source *source) {
+lathe_status lathe__structure_plan(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2],
+                                   const lathe_encode_source *source) {
     state->plan.slices = state->mask.size[2];
     state->plan.level_count = lathe__choose_levels(state->plan.slices);
     out->level_count = state->plan.level_count;
     lathe_status status = choose_plan(state, arena, source);
-    if (!status) status = lathe__state_start_occupancy(state, trained);
-    for (uint32_t level = 0; !status && level < out->level_count; level++) status = encode_level(out, state, arena, level, source);
-    if (!status) status = lathe__count_waiting(out->levels, state, &arena[0]);
-    return status;
+    return status ? status : lathe__count_waiting(out->levels, state, &arena[0]);
 }

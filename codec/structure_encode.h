@@ -27,14 +27,24 @@ typedef struct lathe_baked_structure {
     lathe_level_info levels[LATHE_MAX_LEVELS];
     uint8_t *finer[LATHE_MAX_LEVELS]; /* of each level, if the topology is kept; owned */
     lathe_cap_list caps;
+    const lathe_radius_map *truth; /* of a radius map */
     double area_mm2;           /* of the reference surface; 0 when nothing was measured */
 } lathe_baked_structure;
 void lathe__baked_free(lathe_baked_structure *baked);
 
-/* Takes a state whose mask is the whole structure, and its fraction and flags; chooses its plan. Fills packets. The state then
- * builds the mesh of each level n if its `level` is n and its `finer` is lent from out->finer[n] (lathe__encoded_mesh). */
-lathe_status lathe__structure_encode(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2],
-                                     lathe_occupancy **trained, const lathe_encode_source *source);
+/* Takes a state whose mask is the whole structure, and its fraction and flags; chooses its plan, says what waits. */
+lathe_status lathe__structure_plan(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2],
+                                   const lathe_encode_source *source);
+/* The base shape of the state's mask, with its plan. */
+lathe_status lathe__fit_stars(lathe_structure_state *state, lathe_arena *scratch);
+/* Fills the packet of a level: in ascending order; with SHARED models, level by level and structure by structure as they are sent.
+ * The state then builds the mesh of each level n (lathe__encoded_mesh). */
+lathe_status lathe__structure_encode_level(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2],
+                                           lathe_models *models, uint32_t level, const lathe_encode_source *source);
+/* radius_choose.c: makes the state a radius map (state->radii, out->truth) if that is within 0.24 voxel RMS and 1 voxel anywhere, for
+ * three quarters of the bytes of slices. After the plan. */
+lathe_status lathe__choose_radii(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2], const lathe_volume *volume,
+                                 lathe_axis axis, lathe_boundary boundary, const lathe_encode_source *source);
 /* The mesh of a level, from the encoder's state. */
 lathe_status lathe__encoded_mesh(lathe_mesh *out, lathe_arena arena[2], lathe_structure_state *state, const lathe_baked_structure *baked,
                                  uint32_t level, lathe_surface_counts *counts, uint32_t *shown);

@@ -3,10 +3,13 @@
 
 void lathe__state_free(lathe_structure_state *state) {
     lathe__mask_free(&state->mask);
+    lathe__mask_free(&state->estimate);
     free((void *)(uintptr_t)state->plan.early);
     free(state->finer);
+    state->plan.early = NULL;
+    state->finer = NULL;
     lathe__arena_free(&state->arena);
-    lathe__occupancy_free(&state->occupancy);
+    lathe__state_drop_occupancy(state);
 }
 
 void lathe__number_start(lathe_number_model *models, int count, uint16_t zero) {
@@ -28,9 +31,98 @@ static uint32_t read_shape(lathe_caps *caps, const lathe_mesh *mesh, uint32_t ve
     return (7 - (uint32_t)lathe__get_number(&r->code, &r->models[lathe__cap_context(vertices)])) & 7;
 }
 
-lathe_status lathe__state_start_occupancy(lathe_structure_state *state, lathe_occupancy **trained) {
-    lathe_status status = *trained ? LATHE_OK : lathe__occupancy_new(trained, 3, 3);
-    return status ? status : lathe__occupancy_copy(&state->occupancy, *trained, state->mask.size[0], state->mask.size[1]);
+void lathe__models_start(lathe_models *models, const lathe_header *header) {
+    bool shared = header->parameter_count > 1 && header->parameters[1] & LATHE_FLAG_SHARED;
+    int64_t most = 0;
+    models->widest[0] = models->widest[1] = 3;
+    lathe__base_models(models->base);
+    for (uint32_t i = 0; shared && i < header->structure_count; i++) {
+        const int32_t *size = header->structures[i].size;
+        if ((int64_t)size[0] * size[1] <= most) continue;
+        most = (int64_t)size[0] * size[1];
+        models->widest[0] = size[0];
+        models->widest[1] = size[1];
+    }
+}
+
+lathe_status lathe__state_start_occupancy(lathe_structure_state *state, lathe_models *models) {
+    lathe_status status = models->occupancy ? LATHE_OK : lathe__occupancy_new(&models->occupancy, models->widest[0], models->widest[1]);
+    if (status) return status;
+    if (!(state->flags & LATHE_FLAG_SHARED))
+        return lathe__occupancy_copy(&state->occupancy, models->occupancy, state->mask.size[0], state->mask.size[1]);
+    state->occupancy = models->occupancy;
+    return LATHE_OK;
+}
+
+void lathe__state_drop_occupancy(lathe_structure_state *state) {
+    if (state->flags & LATHE_FLAG_SHARED) state->occupancy = NULL;
+    else lathe__occupancy_free(&state->occupancy);
+}
+
+/* ---- estimates of level 1's slices ---- */
+
+/* Marks where a row's pixels change from outside to inside or back. */
+static void mark_polygon(const lathe_mask *mask, int32_t slice, const lathe_point *p, uint32_t n) {
+    for (uint32_t i = 0; i < n; i++) {
+        lathe_point a = p[i], b = p[i + 1 < n ? i + 1 : 0];
+        if (a.y > b.y) { lathe_point swap = a; a = b; b = swap; }
+        int32_t v = a.y <= 0 ? 1 : (a.y + LATHE_LATTICE_ONE - 1) >> LATHE_LATTICE_BITS;
+        for (; v < mask->size[1] - 1 && v * LATHE_LATTICE_ONE < b.y; v++) {
+            int64_t x = a.x + (int64_t)(b.x - a.x) * (v * LATHE_LATTICE_ONE - a.y) / (b.y - a.y);
+            uint64_t *row = lathe__mask_slice(mask, slice) + (size_t)v * (size_t)mask->row_words;
+            int64_t u = (x + LATHE_LATTICE_ONE - 1) >> LATHE_LATTICE_BITS;
+            if (u < 1) u = 1;
+            if (u < mask->size[0]) row[u >> 6] ^= (uint64_t)1 << (u & 63);
+        }
+    }
+}
+
+/* Each pixel: the parity of the marks up to it. */
+static void fill_slice(const lathe_mask *mask, int32_t slice) {
+    uint64_t *word = lathe__mask_slice(mask, slice), inside = 0;
+    for (size_t i = 0; i < lathe__mask_slice_words(mask); i++) {
+        if (i % (size_t)mask->row_words == 0) inside = 0;
+        uint64_t x = word[i];
+        for (int k = 1; k < 64; k *= 2) x ^= x << k;
+        word[i] = x ^ inside;
+        inside = word[i] >> 63 ? ~(uint64_t)0 : 0;
+    }
+}
+
+lathe_status lathe__state_estimate(lathe_structure_state *state, lathe_arena *scratch) {
+    int32_t *slices, step = lathe__radius_step(lathe__level_stride(&state->plan, 0));
+    uint32_t count;
+    lathe_status status = lathe__level_slices(&slices, &count, scratch, &state->plan, 0);
+    if (status) return status;
+    int32_t size[3] = {state->mask.size[0], state->mask.size[1], (int32_t)count};
+    status = lathe__mask_new(&state->estimate, size, state->mask.origin);
+    for (uint32_t i = 0; !status && i < count; i++) {
+        lathe_outline outline;
+        status = lathe__star_outline(&outline, scratch, &state->base[i], step, i);
+        for (uint32_t l = 0; !status && l < outline.loop_count; l++)
+            mark_polygon(&state->estimate, (int32_t)i, outline.points + outline.loops[l].first, outline.loops[l].count);
+        if (!status) fill_slice(&state->estimate, (int32_t)i);
+    }
+    return status;
+}
+
+/* ---- radius maps ---- */
+
+lathe_status lathe__radius_head(lathe_radius_map *map, const lathe_structure_state *state, lathe_arena *arena, const lathe_number_coder *coder) {
+    lathe_number_model m;
+    const lathe_radius_map *t = coder->truth;
+    lathe__number_start(&m, 1, LATHE_NUMBER_START);
+    int32_t log_rays = coder->code(coder->coder, &m, t ? __builtin_ctz(t->rays) - 6 : 0) + 6;
+    if (log_rays < 3 || log_rays > 10) return LATHE_ERR_FORMAT;
+    *map = (lathe_radius_map){.slices = state->plan.slices, .level_count = state->plan.level_count, .rays = 1u << log_rays,
+                              .farthest = (state->mask.size[0] + state->mask.size[1]) * LATHE_RADIUS_ONE};
+    map->step = coder->code(coder->coder, &m, t ? t->step : 0);
+    map->turn = coder->code(coder->coder, &m, t ? t->turn : 0);
+    for (int k = 0; k < 2; k++) map->apex[k] = coder->code(coder->coder, &m, t ? t->apex[k] - LATHE_APEX_ONE / 2 : 0) + LATHE_APEX_ONE / 2;
+    if (map->step < 1 || map->step > LATHE_RADIUS_MOST_STEP || map->turn < -32768 || map->turn > 32768) return LATHE_ERR_FORMAT;
+    for (int k = 0; k < 2; k++)
+        if (map->apex[k] < 1 || map->apex[k] >= LATHE_APEX_ONE) return LATHE_ERR_FORMAT;
+    return lathe__radius_map_start(map, arena);
 }
 
 static bool contains(const int32_t *list, uint32_t count, int32_t w) {
@@ -49,6 +141,9 @@ lathe_status lathe__new_slices(lathe_new_slice **out, uint32_t *count, lathe_are
     int32_t *now, *before = NULL;
     uint32_t now_count, before_count = 0, n = 0;
     lathe_status status = lathe__level_slices(&now, &now_count, arena, &state->plan, level);
+    int32_t *base = NULL;
+    uint32_t base_count = 0;
+    if (!status && state->estimate.bits) status = lathe__level_slices(&base, &base_count, arena, &state->plan, 0);
     if (!status && level > lathe__first_exact(state)) status = lathe__level_slices(&before, &before_count, arena, &state->plan, level - 1);
     if (status) return status;
     lathe_new_slice *list = LATHE_NEW(arena, lathe_new_slice, now_count);
@@ -58,6 +153,12 @@ lathe_status lathe__new_slices(lathe_new_slice **out, uint32_t *count, lathe_are
         lathe_new_slice *s = &list[n++];
         *s = (lathe_new_slice){.slice = now[i]};
         if (i > 0) { s->known.below = lathe__mask_slice(&state->mask, now[i - 1]); s->known.gap_below = now[i] - now[i - 1]; }
+        for (uint32_t k = 0; k < base_count; k++) {
+            if (base[k] < now[i]) continue;
+            s->known.above = lathe__mask_slice(&state->estimate, (int32_t)k);
+            s->known.estimate = base[k] == now[i] ? 1 : 2;
+            break;
+        }
         for (uint32_t k = i + 1; k < now_count; k++) {
             if (!contains(before, before_count, now[k])) continue;
             s->known.above = lathe__mask_slice(&state->mask, now[k]);
@@ -90,6 +191,13 @@ lathe_status lathe__state_mesh(lathe_mesh *out, lathe_arena arena[2], const lath
     int32_t *slices;
     *counts = (lathe_surface_counts){0};
     if (state->level < 0) return LATHE_ERR_RANGE;
+    if (state->radii) {
+        int32_t stride = lathe__level_stride(&state->plan, (uint32_t)state->level);
+        counts->rays = state->radii->rays / lathe__radius_ray_stride(state->radii, (uint32_t)state->level);
+        *shown = (uint32_t)((state->plan.slices - 1 + stride - 1) / stride) + 1;
+        counts->contour_vertices = (uint64_t)counts->rays * *shown;
+        return lathe__radius_mesh(out, state->radii, (uint32_t)state->level);
+    }
     lathe_arena list = {0};
     lathe_status status = lathe__level_slices(&slices, shown, &list, &state->plan, (uint32_t)state->level);
     if (!status) {

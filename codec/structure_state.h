@@ -5,6 +5,17 @@
 #include "base_shape.h"
 #include "level.h"
 #include "occupancy.h"
+#include "radius_map.h"
+
+/* What adapts while packets are coded. One for a model if it is SHARED; else the occupancy is a template, and each structure starts
+ * from it. */
+typedef struct lathe_models {
+    int32_t widest[2];         /* of the slices to come, set before anything is coded; {3, 3} for a template */
+    lathe_occupancy *occupancy; /* made on first use; owned */
+    lathe_number_model base[LATHE_BASE_MODELS];
+} lathe_models;
+/* Of a model whose structures have these frames. */
+void lathe__models_start(lathe_models *models, const lathe_header *header);
 
 typedef struct lathe_structure_state {
     lathe_mask mask;           /* bits are allocated with the first level of slices */
@@ -16,7 +27,9 @@ typedef struct lathe_structure_state {
     uint8_t *finer;            /* of the level's shown slices, if the topology is kept; owned */
     lathe_arena arena;         /* of the base shape, then of the caps */
     lathe_star_slice *base;    /* one for each slice of level 0 */
-    lathe_occupancy *occupancy;
+    lathe_occupancy *occupancy; /* owned, unless SHARED */
+    lathe_mask estimate;       /* the base shape's slices as pixels, while level 1 is coded */
+    lathe_radius_map *radii;   /* in the arena: the structure is a radius map, and has neither mask nor base */
     lathe_range_decoder cap_code; /* the last packet from its caps on */
     uint8_t *cap_bytes;        /* in the arena; NULL: caps rise half a voxel */
     lathe_caps *caps;          /* instead of the code: an encoder's */
@@ -46,10 +59,16 @@ lathe_status lathe__new_slices(lathe_new_slice **out, uint32_t *count, lathe_are
 lathe_status lathe__state_mesh(lathe_mesh *out, lathe_arena arena[2], const lathe_structure_state *state,
                                lathe_surface_counts *counts, uint32_t *shown);
 
-/* A fresh occupancy state for the structure; *trained is made on first use, so that training is done once for all structures. */
-lathe_status lathe__state_start_occupancy(lathe_structure_state *state, lathe_occupancy **trained);
+/* The structure's occupancy model: its own copy, or the shared one. */
+lathe_status lathe__state_start_occupancy(lathe_structure_state *state, lathe_models *models);
+void lathe__state_drop_occupancy(lathe_structure_state *state);
+/* Fills `estimate` from the base shape. */
+lathe_status lathe__state_estimate(lathe_structure_state *state, lathe_arena *scratch);
+/* Numbers that a radius map begins with; encoder and decoder. */
+enum { LATHE_RADIUS_CHANCE = 1 << 13, LATHE_RADIUS_MOST_STEP = 1 << 16 };
+lathe_status lathe__radius_head(lathe_radius_map *map, const lathe_structure_state *state, lathe_arena *arena, const lathe_number_coder *coder);
 
 /* structure_decode.c: one packet: the state moves to `level` (its level + 1). */
-lathe_status lathe__structure_decode(lathe_structure_state *state, lathe_arena *scratch, lathe_occupancy **trained, uint32_t level,
+lathe_status lathe__structure_decode(lathe_structure_state *state, lathe_arena *scratch, lathe_models *models, uint32_t level,
                                      const uint8_t *payload, size_t size, const char **fault);
 #endif

@@ -89,15 +89,16 @@ static lathe_status append(lathe_world_mesh *out, capacity *room, const lathe_me
     return LATHE_OK;
 }
 
-static lathe_status gather(lathe_world_mesh *out, lathe_decoder *decoder, int64_t structure, lathe_error *err) {
+/* whole: the decoder has seen all structures, else the one as its only one. */
+static lathe_status gather(lathe_world_mesh *out, lathe_decoder *decoder, int64_t structure, bool whole, lathe_error *err) {
     uint32_t count = lathe_decoder_structures(decoder);
     capacity room = {0, 0};
     out->parts = calloc((size_t)count + 1, sizeof *out->parts);
     if (!out->parts) return lathe_fail(err, LATHE_ERR_MEMORY, "out of memory");
     for (uint32_t i = 0; i < count; i++) {
+        if (whole && structure >= 0 && i != (uint32_t)structure) continue;
         const lathe_mesh *mesh = lathe_decoder_mesh(decoder, i);
         if (!mesh) return decoder_failure(decoder, LATHE_ERR_FORMAT, err);
-        /* The stream of one structure has it as its only one. */
         lathe_status status =
             append(out, &room, mesh, lathe_decoder_transform(decoder, i), structure < 0 ? i : (uint32_t)structure);
         if (status) return lathe_fail(err, status, "the mesh is too large: %s", lathe_status_name(status));
@@ -116,8 +117,10 @@ lathe_status lathe_model_mesh(lathe_world_mesh *out, const lathe_model *model, i
     if (status) return lathe_fail(err, status, "out of memory");
     lathe_world_mesh mesh;
     memset(&mesh, 0, sizeof mesh);
-    status = decode(decoder, model, structure, level, err);
-    if (!status) status = gather(&mesh, decoder, structure, err);
+    /* The whole stream saves coding a structure again that cannot be decoded alone. */
+    bool whole = structure < 0 || !info->independent;
+    status = decode(decoder, model, whole ? -1 : structure, level, err);
+    if (!status) status = gather(&mesh, decoder, structure, whole, err);
     lathe_decoder_close(&decoder);
     if (status)
         lathe_world_mesh_free(&mesh);

@@ -23,6 +23,15 @@ bool lathe__segments_meet(const lathe_point *at, uint32_t a, uint32_t b, uint32_
     return !apart(at, a, b, c, d) && !apart(at, c, d, a, b);
 }
 
+bool lathe__is_nearer_left(lathe_left *nearest, lathe_point p, lathe_point a, lathe_point b) {
+    if (a.y > b.y) { lathe_point swap = a; a = b; b = swap; }
+    if (p.y < a.y || p.y >= b.y || (a.x > p.x && b.x > p.x)) return false;
+    double slope = (double)(b.x - a.x) / (double)(b.y - a.y), x = a.x + slope * (double)(p.y - a.y);
+    if (x > p.x || x < nearest->x || (x == nearest->x && slope <= nearest->slope)) return false;
+    *nearest = (lathe_left){x, slope};
+    return true;
+}
+
 lathe_status lathe__grid_build(lathe_grid *grid, lathe_arena *arena, const lathe_range *ranges, uint32_t count, uint64_t most) {
     lathe_range all = ranges[0];
     for (uint32_t i = 1; i < count; i++) {

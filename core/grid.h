@@ -11,6 +11,12 @@ void lathe__range_add(lathe_range *range, int32_t x, int32_t y);
 /* Do the segments at[a] at[b] and at[c] at[d] have a point in common? */
 bool lathe__segments_meet(const lathe_point *at, uint32_t a, uint32_t b, uint32_t c, uint32_t d);
 
+/* The nearest edge so far that lies to the left of a point. */
+typedef struct lathe_left { double x, slope; } lathe_left;
+#define LATHE_NOTHING_LEFT ((lathe_left){-1e18, 0})
+/* Does the edge a b pass left of p, just above its height, and nearer than the one before? Then it takes its place. */
+bool lathe__is_nearer_left(lathe_left *nearest, lathe_point p, lathe_point a, lathe_point b);
+
 typedef struct lathe_grid {
     lathe_range cells;         /* of the whole grid; a cell is coordinate >> shift */
     int shift;

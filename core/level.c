@@ -2,6 +2,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { TRIES = 100 };          /* to find room; few are ever used */
+
 uint32_t lathe__choose_levels(int32_t slices) {
     uint32_t levels = 2;
     while (levels < LATHE_MAX_LEVELS && slices > (int32_t)1 << 2 * (levels - 1)) levels++;
@@ -43,6 +45,26 @@ lathe_status lathe__stack_outlines(lathe_mesh *out, lathe_arena *scratch, const 
     return lathe__stack_with_caps(out, scratch, outlines, heights, count, lattice, NULL, counts);
 }
 
+/* One try to build a slab: RANGE if vertices of the upper outline had to move first, and have. The last try takes what there is. */
+static lathe_status overlay_roomy(lathe_mesh_builder *builder, lathe_arena *scratch, lathe_slab *slab, lathe_overlay_counts *counts,
+                                  uint32_t tries) {
+    const lathe_outline *upper = slab->outline[1];
+    slab->crowded = NULL;
+    if (tries) {
+        slab->crowded = LATHE_NEW(scratch, uint8_t, upper->point_count + 1);
+        if (!slab->crowded) return LATHE_ERR_MEMORY;
+        memset(slab->crowded, 0, upper->point_count);
+    }
+    lathe_status status = lathe__overlay_slab(builder, scratch, slab, counts);
+    for (uint32_t i = 0; status == LATHE_ERR_RANGE && i < upper->point_count; i++) {
+        if (!slab->crowded[i]) continue;
+        int32_t *v = builder->mesh.lattice[slab->base[1] + i];
+        lathe_point p = upper->points[i] = lathe__jitter(upper->points[i], tries);
+        v[0] = p.x, v[1] = p.y;
+    }
+    return status;
+}
+
 lathe_status lathe__stack_with_caps(lathe_mesh *out, lathe_arena *scratch, const lathe_outline *outlines, const int32_t *heights,
                                     uint32_t count, bool lattice, lathe_caps *caps, lathe_surface_counts *counts) {
     static const lathe_outline air = {0};
@@ -62,9 +84,13 @@ lathe_status lathe__stack_with_caps(lathe_mesh *out, lathe_arena *scratch, const
                            .height = {(i ? heights[i - 1] : heights[0] - 1) * LATHE_LATTICE_ONE,
                                       (i < count ? heights[i] : heights[count - 1] + 1) * LATHE_LATTICE_ONE},
                            .base = {base, above}, .cap = LATHE_LATTICE_ONE / 2, .caps = caps, .lattice = lattice};
-        status = lathe__overlay_slab(&builder, scratch, &slab, &counts->overlay);
+        for (uint32_t tries = lattice ? 0 : TRIES; !status; tries--) {
+            status = overlay_roomy(&builder, scratch, &slab, &counts->overlay, tries);
+            lathe__arena_reset(scratch);
+            if (status != LATHE_ERR_RANGE) break;
+            status = LATHE_OK;
+        }
         base = above;
-        lathe__arena_reset(scratch);
     }
     if (status) {
         lathe_mesh_free(&builder.mesh);

@@ -15,6 +15,7 @@
 #include <string.h>
 
 enum { NONE = 0xffffffffu };
+enum { ROOM = 64 };            /* lattice units: what rounding cannot bridge */
 #ifdef LATHE_SMALL
 enum { COUNTED = 0 };          /* nobody asks a small decoder how its joints turned out */
 #else
@@ -57,6 +58,7 @@ typedef struct overlay {
     lathe_tube *tubes;         /* block: matched loops, once asked for */
     uint8_t *matched;          /* block: 0 not tried, 1 there is a tube, 2 there is none */
     uint32_t extra;            /* mesh index of the first meeting */
+    bool harmed;               /* something is crowded */
 } overlay;
 
 static int side_of(const overlay *o, uint32_t vertex) { return vertex >= o->upper; }
@@ -112,8 +114,32 @@ static lathe_status add_meeting(overlay *o, uint32_t a, uint32_t b, int64_t d1, 
     return LATHE_OK;
 }
 
+static int32_t imin(int32_t a, int32_t b) { return a < b ? a : b; }
+static int32_t imax(int32_t a, int32_t b) { return a > b ? a : b; }
+
+/* Does a vertex come within ROOM of an edge? Or a little farther: lengths are taken as sums. */
+static bool comes_close(const overlay *o, uint32_t vertex, uint32_t edge) {
+    lathe_point p = o->at[vertex];
+    lathe_range r = lathe__range_of(o->at[edge], o->at[o->next[edge]]);
+    if (p.x < r.x0 - ROOM || p.x > r.x1 + ROOM || p.y < r.y0 - ROOM || p.y > r.y1 + ROOM) return false;
+    int64_t turn = lathe__turn(o->at, edge, o->next[edge], vertex);
+    return (turn < 0 ? -turn : turn) < ROOM * ((int64_t)r.x1 - r.x0 + r.y1 - r.y0);
+}
+
+/* Marks edge b of the upper outline if it and edge a do not leave each other room. */
+static void test_room(overlay *o, uint32_t a, uint32_t b) {
+    uint32_t a1 = o->next[a], b1 = o->next[b];
+    if (a == b) return;
+    if (!((b != a1 && comes_close(o, b, a)) || (a != b1 && comes_close(o, a, b)) ||
+          (a >= o->upper && b != a1 && a != b1 && lathe__segments_meet(o->at, a, a1, b, b1)))) return;
+    uint8_t *crowded = o->slab->crowded - o->upper;
+    crowded[b] = crowded[b1] = o->harmed = true;
+}
+
 static lathe_status test_edges(overlay *o, uint32_t a, uint32_t b) {
     uint32_t a1 = o->next[a], b1 = o->next[b];
+    if (o->slab->crowded) test_room(o, a, b);
+    if (a >= o->upper) return LATHE_OK;
     int64_t d1 = lathe__turn(o->at, a, a1, b), d2 = lathe__turn(o->at, a, a1, b1);
     if ((d1 > 0) == (d2 > 0)) return LATHE_OK;
     int64_t e1 = lathe__turn(o->at, b, b1, a), e2 = lathe__turn(o->at, b, b1, a1);
@@ -122,11 +148,9 @@ static lathe_status test_edges(overlay *o, uint32_t a, uint32_t b) {
     return add_meeting(o, a, b, d1, d2, e1, e2);
 }
 
-static int32_t imin(int32_t a, int32_t b) { return a < b ? a : b; }
-static int32_t imax(int32_t a, int32_t b) { return a > b ? a : b; }
 
 /* Both sides' edges as boxes, for `rows` (whole rows, without horizontal edges) or to find meetings. In a lattice outline an
- * edge lies within one pixel square, which then is its only cell. */
+ * edge lies within one pixel square, which then is its only cell. Where room is looked for, boxes have it around them. */
 static lathe_range *list_ranges(const overlay *o, bool rows) {
     lathe_range *ranges = LATHE_NEW(o->arena, lathe_range, o->vertices);
     for (uint32_t e = 0; ranges && e < o->vertices; e++) {
@@ -137,18 +161,25 @@ static lathe_range *list_ranges(const overlay *o, bool rows) {
         } else if (o->slab->lattice) {
             r.x1 = imax(r.x1 - 1, r.x0);
             r.y1 = imax(r.y1 - 1, r.y0);
+        } else if (o->slab->crowded) {
+            r.x0 -= ROOM, r.y0 -= ROOM, r.x1 += ROOM, r.y1 += ROOM;
         }
         ranges[e] = r;
     }
     return ranges;
 }
 
+static bool boxes_touch(const lathe_range *a, const lathe_range *b) {
+    return a->x0 <= b->x1 && b->x0 <= a->x1 && a->y0 <= b->y1 && b->y0 <= a->y1;
+}
+
 static lathe_status find_meetings(overlay *o) {
-    if (!o->upper || o->upper == o->vertices) return LATHE_OK;
+    uint32_t below = o->slab->crowded ? o->vertices : o->upper;   /* what the upper outline is held against */
+    if (!below || o->upper == o->vertices) return LATHE_OK;
     lathe_grid grid;
     const lathe_range *ranges = list_ranges(o, false);
     if (!ranges) return LATHE_ERR_MEMORY;
-    lathe_status status = lathe__grid_build(&grid, o->arena, ranges, o->upper, o->slab->lattice ? UINT64_MAX : 4 * (uint64_t)o->upper);
+    lathe_status status = lathe__grid_build(&grid, o->arena, ranges, below, o->slab->lattice ? UINT64_MAX : 4 * (uint64_t)below);
     if (status) return status;
     for (uint32_t f = o->upper; f < o->vertices; f++) {
         lathe_range b = lathe__cells_of(&ranges[f], grid.shift);
@@ -157,6 +188,7 @@ static lathe_status find_meetings(overlay *o) {
                 size_t c = lathe__cell_at(&grid, x, y);
                 for (uint32_t i = grid.first[c]; i < grid.first[c + 1]; i++) {
                     uint32_t e = grid.entry[i];
+                    if (!boxes_touch(&ranges[e], &ranges[f])) continue;
                     lathe_range a = lathe__cells_of(&ranges[e], grid.shift);
                     /* A pair that shares several cells is tested in the first of them. */
                     if (x != imax(a.x0, b.x0) || y != imax(a.y0, b.y0)) continue;
@@ -165,7 +197,7 @@ static lathe_status find_meetings(overlay *o) {
                 }
             }
     }
-    return LATHE_OK;
+    return o->harmed ? LATHE_ERR_RANGE : LATHE_OK;
 }
 
 /* Is meeting m before n on its edge of side s? */
@@ -240,17 +272,12 @@ static lathe_status place_meetings(overlay *o) {
 static uint32_t nearest_left(const overlay *o, uint32_t vertex, int sides) {
     lathe_point at = o->at[vertex];
     uint32_t best = NONE;
-    double x = 0, slope = 0;
+    lathe_left nearest = LATHE_NOTHING_LEFT;
     size_t row = (size_t)((at.y >> LATHE_LATTICE_BITS) - o->rows.cells.y0);
     for (uint32_t i = o->rows.first[row]; i < o->rows.first[row + 1]; i++) {
         uint32_t e = o->rows.entry[i];
         if (e == vertex || e == o->prev[vertex] || !(sides >> side_of(o, e) & 1)) continue;
-        lathe_point a = o->at[e], b = o->at[o->next[e]];
-        if (a.y > b.y) { lathe_point swap = a; a = b; b = swap; }
-        if (at.y < a.y || at.y >= b.y || imin(a.x, b.x) > at.x) continue;
-        double m = (double)(b.x - a.x) / (double)(b.y - a.y), ex = a.x + m * (double)(at.y - a.y);
-        if (ex > at.x) continue;
-        if (best == NONE || ex > x || (ex == x && m > slope)) { best = e; x = ex; slope = m; }
+        if (lathe__is_nearer_left(&nearest, at, o->at[e], o->at[o->next[e]])) best = e;
     }
     return best;
 }

@@ -35,6 +35,7 @@ typedef struct lathe_slab {
     int32_t cap;                       /* how far a cell of a single outline rises from its slice, lattice units, */
     lathe_caps *caps;                  /* or of its own shape; NULL: cap */
     bool lattice;                      /* every edge lies within one pixel square */
+    uint8_t *crowded;                  /* per vertex of the upper outline, zeroed; NULL: room is not looked for */
 } lathe_slab;
 
 /* How the tubes and joints of a slab turned out; sums over slabs. */
@@ -44,7 +45,9 @@ typedef struct lathe_overlay_counts {
     uint64_t contacts;         /* places where a vertex of one outline lies on an edge of the other */
 } lathe_overlay_counts;
 
-/* Appends the triangles of one slab. Scratch comes from the arena; the caller resets it. */
+/* Appends the triangles of one slab. Scratch comes from the arena; the caller resets it.
+ * RANGE, with `crowded` only: rounding could harm the surface, as a vertex lies within 1/1024 voxel of an edge that does not end
+ * there, or the upper outline crosses itself. Vertices of the upper outline that should move are marked; the mesh is as before. */
 lathe_status lathe__overlay_slab(lathe_mesh_builder *builder, lathe_arena *arena, const lathe_slab *slab,
                                  lathe_overlay_counts *counts);
 

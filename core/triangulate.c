@@ -1,13 +1,26 @@
-/* Polygons with holes: holes are bridged, ears clipped, diagonals flipped towards Delaunay.
- * Ear clipping is quadratic, but cells that are not strips are small; it always ends, also where rounding has folded a sliver. */
+/* Polygons with holes: holes are bridged, ears clipped, diagonals flipped towards Delaunay. A grid finds what may lie in the way,
+ * and cutting an ear changes its two neighbours only, so the time grows about as the number of vertices does. Exact for simple
+ * polygons; it ends also where rounding has folded one. */
 #include "grid.h"
 #include "overlay.h"
+#include <string.h>
+
+enum { NONE = 0xffffffffu, PLACES_PER_CELL = 4, FLIP_TURNS = 48 };
+
+typedef struct bridge {        /* one of those that pass a row of the grid */
+    uint32_t edge;
+    struct bridge *more;
+} bridge;
 
 typedef struct ring {
     uint32_t *node, *next, *prev;  /* places of one doubly linked ring */
+    uint32_t *end;                 /* where the edge that begins in a place ended before there were bridges */
+    uint32_t *twin;                /* next place of the same node, cyclically: bridges begin and end in places of their own */
     lathe_point *at;               /* place -> position */
     uint32_t places;
     const lathe_point *positions;  /* node -> position */
+    lathe_grid grid;               /* of the rings' edges, each numbered as its first place */
+    bridge **bridges;              /* by row of the grid */
 } ring;
 
 /* Does the place see another one through its interior angle? */
@@ -21,8 +34,15 @@ static bool same(const ring *r, uint32_t a, uint32_t b) { return r->at[a].x == r
 
 static uint32_t add_place(ring *r, uint32_t node) {
     r->node[r->places] = node;
+    r->twin[r->places] = r->places;
     r->at[r->places] = r->positions[node];
     return r->places++;
+}
+
+static uint32_t add_twin(ring *r, uint32_t place) {
+    uint32_t twin = add_place(r, r->node[place]);
+    r->twin[twin] = r->twin[place];
+    return r->twin[place] = twin;
 }
 
 static void link_places(ring *r, uint32_t a, uint32_t b) {
@@ -35,75 +55,100 @@ static uint32_t add_ring(ring *r, const uint32_t *nodes, uint32_t count) {
     uint32_t first = r->places, leftmost = first;
     for (uint32_t i = 0; i < count; i++) add_place(r, nodes[i]);
     for (uint32_t i = 0; i < count; i++) {
-        link_places(r, first + i, first + (i + 1) % count);
+        uint32_t end = r->end[first + i] = first + (i + 1) % count;
+        link_places(r, first + i, end);
         if (r->at[first + i].x < r->at[leftmost].x) leftmost = first + i;
     }
     return leftmost;
 }
 
-static double distance2(lathe_point a, lathe_point b) {
-    double x = (double)a.x - b.x, y = (double)a.y - b.y;
-    return x * x + y * y;
+static lathe_status build_grid(ring *r, lathe_arena *arena) {
+    lathe_range *ranges = LATHE_NEW(arena, lathe_range, r->places);
+    if (!ranges) return LATHE_ERR_MEMORY;
+    for (uint32_t i = 0; i < r->places; i++) ranges[i] = lathe__range_of(r->at[i], r->at[r->next[i]]);
+    return lathe__grid_build(&r->grid, arena, ranges, r->places, r->places / PLACES_PER_CELL + 1);
 }
 
-static bool bridge_is_free(const ring *r, uint32_t place, uint32_t hole) {
-    if (!in_cone(r, place, hole) || !in_cone(r, hole, place)) return false;
-    for (uint32_t i = 0; i < r->places; i++) {
-        uint32_t n = r->next[i];
-        if (same(r, place, i) || same(r, place, n) || same(r, hole, i) || same(r, hole, n)) continue;
-        if (lathe__segments_meet(r->at, place, hole, i, n)) return false;
+/* The edge or bridge that a ray from a hole's leftmost place to the left meets first, or NONE. */
+static uint32_t first_on_the_left(const ring *r, uint32_t hole) {
+    lathe_point h = r->at[hole];
+    lathe_left nearest = LATHE_NOTHING_LEFT;
+    uint32_t best = NONE;
+    const lathe_grid *grid = &r->grid;
+    int32_t y = h.y >> grid->shift;
+    for (const bridge *b = r->bridges[y - grid->cells.y0]; b; b = b->more)
+        if (lathe__is_nearer_left(&nearest, h, r->at[b->edge], r->at[r->end[b->edge]])) best = b->edge;
+    for (int32_t x = h.x >> grid->shift; x >= grid->cells.x0 && nearest.x < ((double)x + 1) * (1 << grid->shift); x--) {
+        size_t cell = lathe__cell_at(grid, x, y);
+        for (uint32_t k = grid->first[cell]; k < grid->first[cell + 1]; k++) {
+            uint32_t i = grid->entry[k];
+            if (i != hole && r->end[i] != hole && lathe__is_nearer_left(&nearest, h, r->at[i], r->at[r->end[i]])) best = i;
+        }
     }
-    return true;
+    return best;
 }
 
-/* Joins a hole to the ring of `start` by the shortest free bridge from the hole's leftmost place. If no bridge is free
- * (positions folded by rounding), the nearest place serves. */
-static void bridge_hole(ring *r, uint32_t start, uint32_t leftmost) {
-    uint32_t place;
-    lathe_point h = r->at[leftmost];
-    /* Nearest first: each try takes the nearest place beyond the last one tried. */
-    double beyond = -1;
-    uint32_t best = UINT32_MAX, nearest = UINT32_MAX;
-    for (int tries = 0; tries < 64 && best == UINT32_MAX; tries++) {
-        uint32_t candidate = UINT32_MAX;
-        double least = 0;
-        place = start;
-        do {
-            double d = distance2(r->at[place], h);
-            if (d > beyond && (candidate == UINT32_MAX || d < least)) { candidate = place; least = d; }
-            place = r->next[place];
-        } while (place != start);
-        if (candidate == UINT32_MAX) break;
-        if (nearest == UINT32_MAX) nearest = candidate;
-        /* Bridged places share a position: each is tried, one of them has the cone. */
-        place = start;
-        do {
-            if (distance2(r->at[place], h) == least && bridge_is_free(r, place, leftmost)) { best = place; break; }
-            place = r->next[place];
-        } while (place != start);
-        beyond = least;
-    }
-    if (best == UINT32_MAX) best = nearest;
-    uint32_t best2 = add_place(r, r->node[best]), left2 = add_place(r, r->node[leftmost]);
-    uint32_t after = r->next[best], before = r->prev[leftmost];
-    link_places(r, best, leftmost);
+/* A place that the hole's leftmost place sees: the edge that lies to its left has one end not to the right of it; whatever hides that
+ * end lies in the triangle between, and of it the place nearest to the ray is seen. What lies to the left is joined already. */
+static uint32_t place_to_bridge(const ring *r, uint32_t hole) {
+    uint32_t edge = first_on_the_left(r, hole);
+    if (edge == NONE) return 0;    /* only where rounding has folded the polygon */
+    uint32_t end = r->end[edge], best = r->at[edge].x < r->at[end].x ? edge : end, place;
+    int side = lathe__turn(r->at, edge, end, hole) > 0 ? 1 : -1;
+    lathe_point h = r->at[hole], p = r->at[best];
+    int up = p.y >= h.y ? 1 : -1;
+    lathe_range box = lathe__range_of(h, p), c = lathe__cells_of(&box, r->grid.shift);
+    for (int32_t y = c.y0; y <= c.y1; y++)
+        for (int32_t x = c.x0; x <= c.x1; x++) {
+            size_t cell = lathe__cell_at(&r->grid, x, y);
+            for (uint32_t k = r->grid.first[cell]; k < r->grid.first[cell + 1]; k++) {
+                uint32_t i = r->grid.entry[k];
+                lathe_point q = r->at[i];
+                if (q.x >= h.x || (q.y - h.y) * up < 0 || lathe__turn(r->at, edge, end, i) * side <= 0) continue;
+                int64_t turn = lathe__turn(r->at, hole, best, i) * up;
+                if (turn > 0 || (turn == 0 && q.x > r->at[best].x)) best = i;
+            }
+        }
+    for (place = r->twin[best]; place != best && !in_cone(r, place, hole);) place = r->twin[place];
+    return place;
+}
+
+/* Joins a hole to the ring. */
+static lathe_status bridge_hole(ring *r, lathe_arena *arena, uint32_t leftmost) {
+    uint32_t place = place_to_bridge(r, leftmost), place2 = add_twin(r, place), left2 = add_twin(r, leftmost);
+    uint32_t after = r->next[place], before = r->prev[leftmost];
+    link_places(r, place, leftmost);
     link_places(r, before, left2);
-    link_places(r, left2, best2);
-    link_places(r, best2, after);
+    link_places(r, left2, place2);
+    link_places(r, place2, after);
+    r->end[left2] = place2;
+    lathe_range box = lathe__range_of(r->at[place], r->at[leftmost]);
+    for (int32_t y = box.y0 >> r->grid.shift; y <= box.y1 >> r->grid.shift; y++) {
+        bridge *b = LATHE_NEW(arena, bridge, 1), **row = &r->bridges[y - r->grid.cells.y0];
+        if (!b) return LATHE_ERR_MEMORY;
+        *b = (bridge){left2, *row};
+        *row = b;
+    }
+    return LATHE_OK;
 }
 
-/* loose: vertices on the new diagonal are let pass. */
-static bool is_ear(const ring *r, uint32_t place, bool loose) {
+static bool is_ear(const ring *r, uint32_t place) {
     uint32_t p = r->prev[place], n = r->next[place];
     if (lathe__turn(r->at, p, place, n) <= 0) return false;
     lathe_range box = lathe__range_of(r->at[p], r->at[place]);
     lathe__range_add(&box, r->at[n].x, r->at[n].y);
-    for (uint32_t i = r->next[n]; i != p; i = r->next[i]) {
-        lathe_point q = r->at[i];
-        if (q.x < box.x0 || q.x > box.x1 || q.y < box.y0 || q.y > box.y1 || same(r, i, p) || same(r, i, place) || same(r, i, n)) continue;
-        if (lathe__turn(r->at, p, place, i) < loose || lathe__turn(r->at, place, n, i) < loose || lathe__turn(r->at, n, p, i) < loose) continue;
-        return false;
-    }
+    lathe_range c = lathe__cells_of(&box, r->grid.shift);
+    for (int32_t y = c.y0; y <= c.y1; y++)
+        for (int32_t x = c.x0; x <= c.x1; x++) {
+            size_t cell = lathe__cell_at(&r->grid, x, y);
+            for (uint32_t k = r->grid.first[cell]; k < r->grid.first[cell + 1]; k++) {
+                uint32_t i = r->grid.entry[k];
+                lathe_point q = r->at[i];
+                if (q.x < box.x0 || q.x > box.x1 || q.y < box.y0 || q.y > box.y1 || same(r, i, p) || same(r, i, place) || same(r, i, n)) continue;
+                if (lathe__turn(r->at, p, place, i) < 0 || lathe__turn(r->at, place, n, i) < 0 || lathe__turn(r->at, n, p, i) < 0) continue;
+                return false;
+            }
+        }
     return true;
 }
 
@@ -120,34 +165,40 @@ static void cut(const ring *r, uint32_t place, uint32_t triangle[3]) {
     triangle[2] = r->node[r->next[place]];
 }
 
-static uint32_t clip_ears(ring *r, uint32_t start, uint32_t left, uint32_t (*triangles)[3]) {
-    uint32_t count = 0, place = start, failures = 0;
+/* No ear anywhere: rounding has folded the polygon. Any convex place serves, else any proper one. */
+static uint32_t least_bad(const ring *r, uint32_t place, uint32_t left) {
+    uint32_t choice = place;
+    for (uint32_t i = 0; i < left; i++, place = r->next[place]) {
+        if (!proper(r, place)) continue;
+        choice = place;
+        if (lathe__turn(r->at, r->prev[place], place, r->next[place]) > 0) break;
+    }
+    return choice;
+}
+
+/* queue: room for three times as many as there are places. */
+static uint32_t clip_ears(ring *r, uint32_t *queue, uint32_t (*triangles)[3]) {
+    uint32_t count = 0, left = r->places, head = 0, tail = 0, alive = 0;
+    /* Every second place, then those between: that spreads the ears and avoids fans of slivers. */
+    for (uint32_t i = 0; i < left; i += 2) queue[tail++] = i;
+    for (uint32_t i = 1; i < left; i += 2) queue[tail++] = i;
     while (left > 3) {
-        bool ear = is_ear(r, place, failures > left);
-        if (!ear && failures <= 2 * left) {
-            place = r->next[place];
-            failures++;
-            continue;
-        }
-        if (!ear) {
-            /* No ear anywhere: rounding has folded the polygon. Any convex place serves, else any proper one. */
-            uint32_t choice = UINT32_MAX;
-            for (uint32_t i = 0; i < left; i++, place = r->next[place]) {
-                if (!proper(r, place)) continue;
-                if (choice == UINT32_MAX) choice = place;
-                if (lathe__turn(r->at, r->prev[place], place, r->next[place]) > 0) { choice = place; break; }
-            }
-            if (choice != UINT32_MAX) place = choice;
+        uint32_t place;
+        if (head < tail) {
+            place = queue[head++];
+            if (r->next[place] == NONE || !is_ear(r, place)) continue;
+        } else {
+            place = least_bad(r, alive, left);
         }
         uint32_t p = r->prev[place], n = r->next[place];
         cut(r, place, triangles[count++]);
         link_places(r, p, n);
+        r->next[place] = NONE;
+        queue[tail++] = p;
+        queue[tail++] = alive = n;
         left--;
-        failures = 0;
-        /* Going on behind the next place spreads the ears and avoids fans of slivers. */
-        place = r->next[n];
     }
-    cut(r, place, triangles[count++]);
+    cut(r, alive, triangles[count++]);
     return count;
 }
 
@@ -194,11 +245,10 @@ static bool in_circle(lathe_point a, lathe_point b, lathe_point c, lathe_point d
 }
 
 static void flip(uint32_t *corner, uint32_t *neighbour, const lathe_point *at, uint32_t count) {
-    uint32_t budget = count * 12;
     bool changed = true;
-    while (changed && budget) {
+    for (int turns = 0; changed && turns < FLIP_TURNS; turns++) {
         changed = false;
-        for (uint32_t i = 0; i < count * 3 && budget; i++) {
+        for (uint32_t i = 0; i < count * 3; i++) {
             uint32_t j = neighbour[i], p = i - i % 3, q = j - j % 3;
             if (j == UINT32_MAX || p == q) continue;
             uint32_t i1 = turned(i), i2 = turned(i1), j1 = turned(j), j2 = turned(j1);
@@ -216,9 +266,29 @@ static void flip(uint32_t *corner, uint32_t *neighbour, const lathe_point *at, u
             join(neighbour, q, db);
             join(neighbour, q + 1, bc);
             changed = true;
-            budget--;
         }
     }
+}
+
+/* By leftmost x: to the left of a hole lies only what is already joined. */
+static void sort_holes(const ring *r, uint32_t *hole, uint32_t count) {
+    for (uint32_t gap = count / 2; gap; gap /= 2)
+        for (uint32_t i = gap; i < count; i++) {
+            uint32_t moved = hole[i], j = i;
+            for (; j >= gap && r->at[hole[j - gap]].x > r->at[moved].x; j -= gap) hole[j] = hole[j - gap];
+            hole[j] = moved;
+        }
+}
+
+static lathe_status bridge_holes(ring *r, lathe_arena *arena, uint32_t *hole, uint32_t count) {
+    size_t rows = (size_t)(r->grid.cells.y1 - r->grid.cells.y0) + 1;
+    lathe_status status = LATHE_OK;
+    r->bridges = LATHE_NEW(arena, bridge *, rows);
+    if (!r->bridges) return LATHE_ERR_MEMORY;
+    memset(r->bridges, 0, rows * sizeof *r->bridges);
+    sort_holes(r, hole, count);
+    for (uint32_t i = 0; !status && i < count; i++) status = bridge_hole(r, arena, hole[i]);
+    return status;
 }
 
 lathe_status lathe__triangulate(uint32_t (**triangles)[3], uint32_t **neighbour, uint32_t *count, lathe_arena *arena,
@@ -227,27 +297,22 @@ lathe_status lathe__triangulate(uint32_t (**triangles)[3], uint32_t **neighbour,
     uint32_t places = nodes + 2 * holes, want = places - 2;
     ring r = {.positions = polygon->at};
     r.at = LATHE_NEW(arena, lathe_point, places);
-    r.node = LATHE_NEW(arena, uint32_t, places);
-    r.next = LATHE_NEW(arena, uint32_t, places);
-    r.prev = LATHE_NEW(arena, uint32_t, places);
+    uint32_t *room = LATHE_NEW(arena, uint32_t, (size_t)places * 8 + holes + 1);
     *triangles = lathe__arena_alloc(arena, want, sizeof **triangles);
     *neighbour = LATHE_NEW(arena, uint32_t, (size_t)want * 3);
-    uint32_t *hole = LATHE_NEW(arena, uint32_t, holes + 1);
-    if (!r.at || !r.node || !r.next || !r.prev || !*triangles || !*neighbour || !hole) return LATHE_ERR_MEMORY;
-    uint32_t start = 0;
+    if (!r.at || !room || !*triangles || !*neighbour) return LATHE_ERR_MEMORY;
+    r.node = room;
+    r.next = room + places;
+    r.prev = room + 2 * (size_t)places;
+    r.end = room + 3 * (size_t)places;
+    r.twin = room + 4 * (size_t)places;
+    uint32_t *queue = room + 5 * (size_t)places, *hole = room + 8 * (size_t)places;
     for (uint32_t i = 0, begin = 0; i <= holes; begin = polygon->ring_end[i++])
         hole[i] = add_ring(&r, polygon->nodes + begin, polygon->ring_end[i] - begin);
-    /* By leftmost x: to the left of a hole lies only what is already joined. */
-    for (uint32_t i = 1; i <= holes; i++)
-        for (uint32_t j = i; j > 1; j--) {
-            lathe_point a = r.at[hole[j - 1]], b = r.at[hole[j]];
-            if (a.x <= b.x) break;
-            uint32_t swap = hole[j];
-            hole[j] = hole[j - 1];
-            hole[j - 1] = swap;
-        }
-    for (uint32_t i = 1; i <= holes; i++) bridge_hole(&r, start, hole[i]);
-    *count = clip_ears(&r, start, places, *triangles);
+    lathe_status status = build_grid(&r, arena);
+    if (!status && holes) status = bridge_holes(&r, arena, hole + 1, holes);
+    if (status) return status;
+    *count = clip_ears(&r, queue, *triangles);
     if (!find_neighbours(*neighbour, arena, **triangles, *count)) return LATHE_ERR_MEMORY;
     flip(**triangles, *neighbour, polygon->at, *count);
     return LATHE_OK;

@@ -64,7 +64,7 @@ bool lathe__interrupted(void);
 typedef struct lathe_bake_arguments {
     const char *input, *output, *name;
     const char *iso, *label, *labels, *axis, *boundary, *topology, *spacing;
-    bool errors, draco, quiet;
+    bool errors, draco, quiet, exact, independent;
 } lathe_bake_arguments;
 void lathe__bake_arguments_defaults(lathe_bake_arguments *arguments);
 /* command is for complaints about usage. Returns an exit status. */

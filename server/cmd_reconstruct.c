@@ -15,6 +15,7 @@ typedef struct reconstruct_job {
     bool has_iso, has_label, json, quiet;
     int axis;                  /* -1: auto */
     int64_t smooth;            /* pieces of an edge; 0: flat triangles */
+    double tolerance;          /* mm: fewer points first; 0: all */
     lathe_reconstruct_options options;
 } reconstruct_job;
 
@@ -204,7 +205,7 @@ static int choose(const char *text, const char *const *names, int count) {
 }
 
 typedef struct reconstruct_texts {
-    const char *output, *format, *iso, *label, *axis, *tiling, *links, *threshold, *branching, *mid, *rays, *smooth;
+    const char *output, *format, *iso, *label, *axis, *tiling, *links, *threshold, *branching, *mid, *rays, *smooth, *hierarchy;
 } reconstruct_texts;
 
 static int parse_methods(reconstruct_job *job, const lathe_command *command, const reconstruct_texts *t) {
@@ -248,6 +249,8 @@ static int parse_input(reconstruct_job *job, const lathe_command *command, const
         return lathe__usage_error(command, "--label %s: a whole number is needed", t->label);
     if (t->smooth && !lathe__option_integer(&job->smooth, t->smooth, 1, LATHE_SMOOTH_MAX))
         return lathe__usage_error(command, "--smooth %s: 1 to %d", t->smooth, LATHE_SMOOTH_MAX);
+    if (t->hierarchy && (!lathe__option_number(&job->tolerance, t->hierarchy) || job->tolerance <= 0))
+        return lathe__usage_error(command, "--hierarchy %s: a number of mm above 0", t->hierarchy);
     job->has_iso = t->iso != NULL;
     job->has_label = t->label != NULL;
     return LATHE_PARSED;
@@ -264,6 +267,7 @@ static int run(int argc, char **argv) {
         LATHE_OPTION_TEXT("links", 0, &t.links),           LATHE_OPTION_TEXT("threshold", 0, &t.threshold),
         LATHE_OPTION_TEXT("branching", 0, &t.branching),   LATHE_OPTION_TEXT("mid-slices", 0, &t.mid),
         LATHE_OPTION_TEXT("rays", 0, &t.rays),             LATHE_OPTION_TEXT("smooth", 0, &t.smooth),
+        LATHE_OPTION_TEXT("hierarchy", 0, &t.hierarchy),
         LATHE_OPTION_FLAG("quiet", &job.quiet, true),
     };
     memset(&t, 0, sizeof t);
@@ -277,6 +281,11 @@ static int run(int argc, char **argv) {
     lathe_contour_set set;
     memset(&set, 0, sizeof set);
     status = lathe__is_contour_json(job.input) ? read_contours(&set, &job) : read_volume(&set, &job);
+    if (status == LATHE_EXIT_OK && job.tolerance > 0) {
+        lathe_status simplified = lathe__contour_set_simplify(&set, job.tolerance);
+        if (simplified) status = lathe__status_error("reconstruct", job.input, simplified, NULL);
+        job.options.lattice = false;
+    }
     if (status == LATHE_EXIT_OK) status = reconstruct_set(&job, &set);
     lathe__contour_set_free(&set);
     return status;
@@ -296,6 +305,7 @@ const lathe_command lathe__command_reconstruct = {
     "      --threshold X         of --links paper; default 0.45\n"
     "      --branching B         overlay (default), paper (exterior and interior polygons)\n"
     "      --mid-slices M        --branching paper: never (default), wide (copies in the middle of high slabs)\n"
+    "      --hierarchy MM        first fewer points: edges within MM of the contours, by the hierarchy without intersections\n"
     "      --smooth K            writes the smooth surface, every edge in K pieces (1 to 16)\n"
     "  -f, --format F            default: what OUT ends with\n"
     "      --quiet               no report\n"

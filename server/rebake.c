@@ -44,6 +44,8 @@ lathe_status lathe__rebake(lathe_rebaked *out, const lathe_model_info *info, con
     options.name = info->name;
     options.keep_topology = info->keep_topology;
     options.flat_caps = !info->caps;
+    options.exact = info->exact;
+    options.independent = info->independent;
     options.measure = options.draco = false;
     if (isnan(info->iso)) {
         options.structures = structures;

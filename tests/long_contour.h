@@ -1,5 +1,5 @@
-/* Contours with as many crossings as asked for, full of folds: a curve that swings forward and backward while it goes round once.
- * It crosses itself, which parsing and tiling do not mind. */
+/* Contours with as many crossings as asked for, full of folds: a curve that swings forward and backward while it goes
+ * round once. It crosses itself, which parsing and tiling do not mind. */
 #ifndef LATHE_LONG_CONTOUR_H
 #define LATHE_LONG_CONTOUR_H
 #include "sections.h"
@@ -10,7 +10,8 @@ static inline uint32_t long_contour_rays(uint32_t crossings) {
     while (rays < 65536 && rays * 16 < crossings) rays *= 2;
     return rays;
 }
-/* About `crossings` crossings at long_contour_rays(crossings) rays; variant changes the radii and the swings a little. */
+/* About `crossings` crossings at long_contour_rays(crossings) rays; variant changes the radii and the swings a little.
+ * */
 static inline lathe_status long_contour(lathe_ray_contour *out, lathe_arena *arena, uint32_t crossings, int variant) {
     uint32_t rays = long_contour_rays(crossings), swings = rays / 32, count = swings * 64;
     double width = 8.0 * crossings / rays; /* of a swing, in rays */

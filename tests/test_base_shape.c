@@ -52,7 +52,9 @@ static bool same_stars(const lathe_star_slice *a, const lathe_star_slice *b, uin
 static lathe_status decode(lathe_star_slice *out, uint32_t count, const uint8_t *bytes, size_t size, const lathe_mask *frame) {
     lathe_range_decoder d;
     lathe__decoder_start(&d, bytes, size);
-    return lathe__base_decode(out, count, &arena, &d, frame);
+    lathe_number_model models[LATHE_BASE_MODELS];
+    lathe__base_models(models);
+    return lathe__base_decode(out, count, &arena, &d, frame, models);
 }
 
 static void check_round_trips(void) {
@@ -64,7 +66,9 @@ static void check_round_trips(void) {
         lathe_range_encoder e;
         random_stars(&s, &seed, &frame);
         lathe__encoder_start(&e);
-        CHECK(lathe__base_encode(&e, s.slices, s.count, &frame) == LATHE_OK);
+        lathe_number_model models[LATHE_BASE_MODELS];
+        lathe__base_models(models);
+        CHECK(lathe__base_encode(&e, s.slices, s.count, &frame, models) == LATHE_OK);
         lathe__encoder_finish(&e);
         if (CHECK(decode(back, s.count, e.bytes, e.size, &frame) == LATHE_OK)) CHECK(same_stars(s.slices, back, s.count));
         lathe__encoder_free(&e);

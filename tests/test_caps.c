@@ -26,6 +26,7 @@ static lathe_world_mesh last_level(lathe_volume *volume, bool flat_caps, float *
     options.draco = false;
     options.samples = 20000;
     options.flat_caps = flat_caps;
+    options.exact = true;          /* caps are of slices */
     if (lathe_bake(volume, &options, append, &out, &err) || lathe_model_parse(&model, out.data, out.size, &err)) abort();
     const lathe_model_info *info = lathe_model_describe(model);
     CHECK_EQ(info->caps, !flat_caps);

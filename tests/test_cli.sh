@@ -33,7 +33,7 @@ exits 2
 exits 0 --help; prints "lathe COMMAND"
 exits 0 --version; prints "^lathe [0-9]"
 exits 2 nonsense; says "no such command"
-for command in bake serve info export verify bench hash; do exits 0 $command --help; prints "^Usage: lathe $command"; done
+for command in bake serve info export verify bench hash reconstruct; do exits 0 $command --help; prints "^Usage: lathe $command"; done
 exits 2 bake
 exits 2 info
 exits 2 info a b
@@ -143,6 +143,28 @@ if [ -x "$programs/draco_check" ]; then
     for mesh in all ring; do ok "Draco decodes what STL has: $mesh" "$programs/draco_check" "$here/$mesh.drc" "$here/$mesh.stl"; done
 fi
 ok "glTF validator" node tests/gltf_validate.mjs "$here/all.glb" "$here/ring.glb"
+
+# ---- contour sets ----
+set=tests/data/y_with_hole.json
+for options in "" "--branching paper" "--branching paper --links paper --mid-slices wide" "--tiling toroidal" "--tiling christiansen" \
+    "--tiling shortest --hierarchy 0.3" "--smooth 3"; do
+    # shellcheck disable=SC2086
+    exits 0 reconstruct $set $options -o "$here/y.stl"; prints "free of self-intersections"
+    if [ -x "$programs/cgal_check" ] && [ "$options" != "--smooth 3" ]; then ok "CGAL: reconstruct $options" "$programs/cgal_check" "$here/y.stl"; fi
+done
+for format in ply glb drc; do exits 0 reconstruct $set --quiet -o "$here/y.$format"; done
+exits 0 reconstruct "$here/ball.json" --iso 128 -o "$here/ball.ply"; prints "components 1, Euler characteristic 2"
+exits 0 reconstruct "$here/labels.json" --label 3 --branching paper -o "$here/ring.ply"; prints "components 1, Euler characteristic 0"
+exits 0 bake $set -o "$here/y.lathe"; says "voxels of"
+exits 0 bake $set --spacing 0.7 -o "$here/y.lathe"; says "0.7 mm"
+exits 0 verify "$here/y.lathe"; prints "passed"
+exits 1 bake $set --spacing 0.0001 -o "$here/no.lathe"
+exits 2 reconstruct $set
+exits 2 reconstruct $set -o x.stl --tiling best; says "it is one of trees"
+exits 2 reconstruct $set -o x.stl --rays 12; says "power of two"
+exits 1 reconstruct "$here/none.json" -o "$here/no.stl"
+echo '{"sections":[{"z":0,"polygons":[[[0,0],[9,9],[9,0],[0,9]]]}]}' >"$here/bow.json"
+exits 1 reconstruct "$here/bow.json" -o "$here/no.stl"; says "section 0, polygon 0"
 
 # ---- bench and hash ----
 exits 0 hash "$here/ball.lathe"; prints "^[0-9a-f]\{16\}$"

@@ -213,7 +213,7 @@ static void compare_with_state(const phantom *p, const lathe_model *model, const
     lathe_structure_state state = {.level = -1};
     lathe_baked_structure baked;
     lathe_arena arena[2] = {{0}, {0}};
-    lathe_occupancy *trained = NULL;
+    lathe_models models = {.widest = {3, 3}};
     lathe_header header;
     lathe_reader reader = lathe__reader(archive->data, archive->size);
     memset(&baked, 0, sizeof baked);
@@ -222,8 +222,11 @@ static void compare_with_state(const phantom *p, const lathe_model *model, const
     lathe_encode_source source = source_of(&g, volume, &state.mask, p->axis);
     if (lathe__header_parse(&header, &reader)) abort();
     state.fraction = (int)header.parameters[0];
-    state.flags = header.parameter_count > 1 ? header.parameters[1] : 0;
-    CHECK(lathe__structure_encode(&baked, &state, arena, &trained, &source) == LATHE_OK);
+    state.flags = header.parameter_count > 1 ? header.parameters[1] & ~(uint32_t)LATHE_FLAG_SHARED : 0;
+    CHECK(lathe__structure_plan(&baked, &state, arena, &source) == LATHE_OK);
+    CHECK(lathe__choose_radii(&baked, &state, arena, volume, p->axis, header.boundary, &source) == LATHE_OK);
+    for (uint32_t level = 0; level < baked.level_count; level++)
+        CHECK(lathe__structure_encode_level(&baked, &state, arena, &models, level, &source) == LATHE_OK);
     lathe_volume_close(&volume);
     lathe_transform transform = lathe__mask_transform(&state.mask, p->axis, header.affine);
     uint32_t levels = 0;
@@ -243,7 +246,7 @@ static void compare_with_state(const phantom *p, const lathe_model *model, const
     lathe__header_free(&header);
     lathe__baked_free(&baked);
     lathe__state_free(&state);
-    lathe__occupancy_free(&trained);
+    lathe__occupancy_free(&models.occupancy);
     lathe__arena_free(&arena[0]);
     lathe__arena_free(&arena[1]);
 }

@@ -1,5 +1,6 @@
-/* Derivation trees and the tiling that walks them: the paper's figures 10 and 11 and its case 3, random contours of pixel
- * regions (each tree derived again by code of the test's own), work counts up to 10^6 crossings; and the drawing of both. */
+/* Derivation trees and the tiling that walks them: the paper's figures 10 and 11 and its case 3, random contours of
+ * pixel regions (each tree derived again by code of the test's own), work counts up to 10^6 crossings; and the drawing
+ * of both. */
 #include "centre.h"
 #include "check.h"
 #include "derivation.h"
@@ -183,7 +184,8 @@ static const polar TWO_FORS[] = {{0, 6}, {1, 9}, {2, 9}, {2, 5}, {1, 5}, {1, 3},
 static const polar OUTER[] = {{0, 6}, {1, 9}, {2, 9}, {3, 6}, {4, 6}, {5, 6}, {6, 6}, {7, 6}};
 static const polar INNER[] = {{0, 6}, {1, 3}, {2, 3}, {3, 6}, {4, 6}, {5, 6}, {6, 6}, {7, 6}};
 
-/* Figure 10: two FOR edges between r1 and r2; towards one neighbour the outer, towards the other the inner is level-1. */
+/* Figure 10: two FOR edges between r1 and r2; towards one neighbour the outer, towards the other the inner is level-1.
+ * */
 static void test_figure_10(void) {
     lathe_arena arena = {0};
     lathe_ray_contour middle, outer, inner;
@@ -232,7 +234,8 @@ static void check_steps(const polar *a_list, uint32_t a_count, const polar *b_li
     lathe__arena_free(&arena);
 }
 
-/* Figure 11: u_o u_i u_o u_i on one ray; the neighbours have one u_o u_i, one near the lower, one near the upper pair. */
+/* Figure 11: u_o u_i u_o u_i on one ray; the neighbours have one u_o u_i, one near the lower, one near the upper pair.
+ * */
 static void test_figure_11(void) {
     static const polar middle[] = {{0, 5}, {1, 2}, {1, 4}, {1, 6}, {1, 8}, {1, 10}, {2, 5}, {3, 5}};
     static const polar low[] = {{0, 5}, {1, 2}, {1, 4}, {1, 6}, {2, 5}, {3, 5}};
@@ -328,7 +331,8 @@ static void test_regions(void) {
 
 /* ---- contours that overlap themselves ---- */
 
-/* Whether any two edges of the polygon cross properly, or two edges on one ray share more than a point: by brute force. */
+/* Whether any two edges of the polygon cross properly, or two edges on one ray share more than a point: by brute
+ * force. */
 static bool overlaps(const lathe_ray_contour *c) {
     for (uint32_t i = 0; i < c->count; i++)
         for (uint32_t j = 0; j < i; j++) {

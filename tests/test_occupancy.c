@@ -61,7 +61,7 @@ static void visit_levels(const stack *s, int32_t gap, visit *see, void *context)
             int32_t b = w - 1, a = w + 1;
             while (b >= 0 && !have[b]) b--;
             while (a < s->count && !have[a]) a++;
-            lathe_known known = {slice(s, b), slice(s, a), w - b, a - w};
+            lathe_known known = {slice(s, b), slice(s, a), w - b, a - w, 0};
             see(context, s, w, &known);
             have[w] = true;
         }

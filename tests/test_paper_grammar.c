@@ -1,6 +1,7 @@
-/* The paper's G and G' by brute force: all planar crossing systems of 3 rays with up to 7 crossings a ray and of 4 rays with up to
- * 5 (3 rays: 17 in all, of 21; without that limit G rejects 24,097 of 334,871 strings, with F -> F D none, in 7 s). How many of the
- * cyclic strings G rejects (theorem 1), what F -> F D adds, properties 1 to 4, and each tree derived again. */
+/* The paper's G and G' by brute force: all planar crossing systems of 3 rays with up to 7 crossings a ray and of 4
+ * rays with up to 5 (3 rays: 17 in all, of 21; without that limit G rejects 24,097 of 334,871 strings, with F -> F D
+ * none, in 7 s). How many of the cyclic strings G rejects (theorem 1), what F -> F D adds, properties 1 to 4, and each
+ * tree derived again. */
 #include "centre.h"
 #include "check.h"
 #include "paper_grammar.h"
@@ -90,7 +91,8 @@ static void remember(systems *s) {
     }
 }
 
-/* end[p]: the other end of the path that ends in p. An arc between two ends of one path closes a loop: only the last one may. */
+/* end[p]: the other end of the path that ends in p. An arc between two ends of one path closes a loop: only the last
+ * one may. */
 static void add_sector(systems *s, uint32_t sector, const int8_t *end, uint32_t arcs) {
     const matchings *m = &s->of[(s->on_ray[sector] + s->on_ray[(sector + 1) % s->rays]) / 2];
     uint32_t total = s->base[s->rays];
@@ -154,7 +156,8 @@ static bool is_type(const lathe_paper_node *n, uint8_t type) {
                                        LATHE_PAPER_U_O, LATHE_PAPER_D_I, LATHE_PAPER_D_O};
     return n->symbol == symbols[type];
 }
-/* The productions as text: node -> children, one letter each: F B D U, i o r for D_I D_O D_R, I O R for U_I U_O U_R, S, . leaf. */
+/* The productions as text: node -> children, one letter each: F B D U, i o r for D_I D_O D_R, I O R for U_I U_O U_R,
+ * S, . leaf. */
 static bool in_grammar(const char *production, unsigned options) {
     static const char *const g[] = {"FDFU", "FDF",  "FFU", "F.",   "B.",   "DDD", "DDU", "DUD", "Dio",
                                     "iFiB", "iiR",  "i.",  "oBoF", "ooU",  "o.",  "UUU", "UDU", "UUD",
@@ -200,8 +203,8 @@ static int sum_of(const uint8_t *types, uint32_t count, int type) {
     for (uint32_t i = 0; i < count; i++) sum += types[i] == type;
     return sum;
 }
-/* Property 1: between FOR and BACK an odd number of UP and DOWN edges (else an even one); 2: #f - #b = rays; 4: on each ray, and on
- * all together, as many d_i as d_o and u_i as u_o. */
+/* Property 1: between FOR and BACK an odd number of UP and DOWN edges (else an even one); 2: #f - #b = rays; 4: on
+ * each ray, and on all together, as many d_i as d_o and u_i as u_o. */
 static void count_properties(counts *n, const uint8_t *types, uint32_t count, uint32_t rays) {
     int last = -1, between = 0, per_ray[4][4] = {{0}}, whole[4] = {0};
     uint32_t ray = 0;

@@ -1,6 +1,7 @@
-/* Centre, rays and crossings against brute force, identical on 100,000 random small regions. The brute force shares nothing with
- * the library but the ray directions: areas and stretches by counting pixels, crossings by intersecting every ray with every
- * segment in exact fractions, IN-OUT by sorting each ray's crossings, ties by a ray turned a little clockwise. */
+/* Centre, rays and crossings against brute force, identical on 100,000 random small regions. The brute force shares
+ * nothing with the library but the ray directions: areas and stretches by counting pixels, crossings by intersecting
+ * every ray with every segment in exact fractions, IN-OUT by sorting each ray's crossings, ties by a ray turned a
+ * little clockwise. */
 #include "centre.h"
 #include "check.h"
 #include "pixel_shapes.h"
@@ -55,8 +56,8 @@ static void random_region(grid *g, uint64_t *seed) {
 }
 static bool inside(const grid *g, int x, int y) { return x >= 0 && y >= 0 && x < SIZE && y < SIZE && g->at[y][x]; }
 
-/* The outer loop along pixel borders, counter-clockwise, turning left where two ways are open (two pixels that touch in a corner:
- * the loop then meets itself there). Corner (x, y) is the lower left one of pixel (x, y). */
+/* The outer loop along pixel borders, counter-clockwise, turning left where two ways are open (two pixels that touch
+ * in a corner: the loop then meets itself there). Corner (x, y) is the lower left one of pixel (x, y). */
 static void trace_borders(ring *r, const grid *g) {
     static const int dx[4] = {1, 0, -1, 0}, dy[4] = {0, 1, 0, -1};
     int x = 0, y = 0;

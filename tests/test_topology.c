@@ -51,7 +51,7 @@ static void random_noise(lathe_mask *m, int size, int slices) {
 }
 
 static lathe_arena arena[2];
-static lathe_occupancy *trained;
+static lathe_models models = {.widest = {3, 3}};
 
 /* The encoder's levels, decoded packet by packet; *levels is filled from the encoder. */
 static uint32_t code(const lathe_mask *mask, uint32_t flags, lathe_level_info levels[LATHE_MAX_LEVELS], lathe_mesh meshes[LATHE_MAX_LEVELS]) {
@@ -60,7 +60,8 @@ static uint32_t code(const lathe_mask *mask, uint32_t flags, lathe_level_info le
     lathe_encode_source source = {.slice_ratio = 1};
     memset(&baked, 0, sizeof baked);
     state.mask = *mask;
-    CHECK(lathe__structure_encode(&baked, &state, arena, &trained, &source) == LATHE_OK);
+    CHECK(lathe__structure_plan(&baked, &state, arena, &source) == LATHE_OK);
+    for (uint32_t n = 0; n < baked.level_count; n++) CHECK(lathe__structure_encode_level(&baked, &state, arena, &models, n, &source) == LATHE_OK);
     memcpy(levels, baked.levels, sizeof baked.levels);
     other.plan = (lathe_level_plan){.slices = mask->size[2], .level_count = baked.level_count};
     memcpy(other.mask.size, mask->size, sizeof mask->size);
@@ -70,7 +71,7 @@ static uint32_t code(const lathe_mask *mask, uint32_t flags, lathe_level_info le
         lathe_surface_counts counts;
         lathe_mesh mesh = {0};
         uint32_t shown;
-        CHECK(lathe__structure_decode(&other, &arena[0], &trained, n, baked.packets[n].data, baked.packets[n].size, &fault) == LATHE_OK);
+        CHECK(lathe__structure_decode(&other, &arena[0], &models, n, baked.packets[n].data, baked.packets[n].size, &fault) == LATHE_OK);
         CHECK(lathe__state_mesh(&meshes[n], arena, &other, &counts, &shown) == LATHE_OK);
         CHECK(lathe__encoded_mesh(&mesh, arena, &state, &baked, n, &counts, &shown) == LATHE_OK);
         CHECK(mesh.vertex_count == meshes[n].vertex_count && mesh.triangle_count == meshes[n].triangle_count &&
@@ -199,7 +200,7 @@ int main(void) {
         check_own(&m, what);
         lathe__mask_free(&m);
     }
-    lathe__occupancy_free(&trained);
+    lathe__occupancy_free(&models.occupancy);
     lathe__arena_free(&arena[0]);
     lathe__arena_free(&arena[1]);
     return check_end();

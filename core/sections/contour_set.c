@@ -1,5 +1,6 @@
 #include "contour_set.h"
 #include "grid.h"
+#include "hierarchy.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -269,7 +270,7 @@ static lathe_status build(building *b) {
 }
 
 lathe_status lathe__contour_set_build(lathe_contour_set *out, lathe_set_repairs *repairs, const lathe_raw_set *raw, lathe_error *err) {
-    building b = {.raw = raw, .err = err, .tests = (uint64_t)1 << 31};
+    building b = {.raw = raw, .err = err, .tests = (uint64_t)1 << 29};
     lathe_status status = build(&b);
     lathe__arena_free(&b.scratch);
     if (status) {
@@ -325,5 +326,20 @@ lathe_status lathe__contour_set_of_mask(lathe_contour_set *out, const lathe_mask
     }
     if (status) lathe__contour_set_free(&set);
     else *out = set;
+    return status;
+}
+
+lathe_status lathe__contour_set_simplify(lathe_contour_set *set, double tolerance_mm) {
+    const double(*m)[4] = set->transform.m;
+    double unit = sqrt(fmin(m[0][0] * m[0][0] + m[1][0] * m[1][0] + m[2][0] * m[2][0], m[0][1] * m[0][1] + m[1][1] * m[1][1] + m[2][1] * m[2][1]));
+    double tolerance = tolerance_mm / unit;
+    if (!(tolerance >= 1)) return LATHE_OK;   /* finer than the lattice */
+    lathe_status status = LATHE_OK;
+    for (uint32_t s = 0; !status && s < set->count; s++) {
+        lathe_outline less;
+        if (!set->sections[s].outline.point_count) continue;
+        status = lathe__simplify_section(&less, &set->arena, &set->sections[s].outline, tolerance);
+        if (!status) set->sections[s].outline = less;
+    }
     return status;
 }

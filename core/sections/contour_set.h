@@ -7,7 +7,7 @@
 enum {
     LATHE_SET_SECTIONS = 4096,         /* most sections of a set */
     LATHE_SET_POLYGONS = 4096,         /* most polygons of a section */
-    LATHE_SET_SECTION_POINTS = 65536,  /* most points of a section */
+    LATHE_SET_SECTION_POINTS = 16384,  /* most points of a section */
     LATHE_SET_POINTS = 1 << 20,        /* most points of a set */
     LATHE_SET_QUANTA = 1 << 20,        /* the longest side of the set's box is so many quanta */
     LATHE_SET_QUANTUM = 64             /* lattice units: positions of a set that is read are multiples of this */
@@ -39,7 +39,7 @@ typedef struct lathe_set_repairs {
  * Errors (err says which section and polygon, counted from 0 as given): RANGE: a number that is not finite or beyond 1e9 mm;
  * FORMAT: no section, no polygon at all, two sections at one height, a polygon with fewer than three points or without area after
  * repairs, polygons that touch or cross each other or themselves; LIMIT: the limits above; MEMORY. Hostile input is safe: at most
- * 2^31 pairs of edges are tried. *out is untouched on failure; free it with lathe__contour_set_free. */
+ * 2^29 pairs of edges are tried. *out is untouched on failure; free it with lathe__contour_set_free. */
 lathe_status lathe__contour_set_build(lathe_contour_set *out, lathe_set_repairs *repairs, const lathe_raw_set *raw, lathe_error *err);
 
 /* Where the grey values cross iso on border edges of a mask, on average: 0..64 from the inside pixel's centre to the outside one's. */
@@ -48,6 +48,10 @@ int lathe__mean_fraction(const lathe_mask *mask, const lathe_volume *volume, lat
  * transform: of the mask's lattice. MEMORY, LIMIT. */
 lathe_status lathe__contour_set_of_mask(lathe_contour_set *out, const lathe_mask *mask, const lathe_transform *transform, int fraction);
 void lathe__contour_set_free(lathe_contour_set *set);
+
+/* Fewer points: every section's outline replaced by one whose edges are within tolerance mm of it, by the hierarchy that
+ * never intersects [H]. Loops stay simple and nested. LIMIT, RANGE, FORMAT as lathe__simplify_section; MEMORY. */
+lathe_status lathe__contour_set_simplify(lathe_contour_set *set, double tolerance_mm);
 
 /* The first pair of edges of an outline that meet beyond a common vertex; edges are numbered by the vertices they begin in.
  * *found: whether there is one. tests: how many pairs may still be tried; LIMIT when they run out. MEMORY. */

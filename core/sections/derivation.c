@@ -5,7 +5,8 @@
 enum { MASK_D = 1, MASK_U = 2 };
 static const uint32_t MAX_EDGES = UINT32_MAX / 8;
 
-/* One contour while its tree is made. Folds are indexed by ray: what lies between level-1 edge i - 1 and level-1 edge i. */
+/* One contour while its tree is made. Folds are indexed by ray: what lies between level-1 edge i - 1 and level-1 edge
+ * i. */
 typedef struct side {
     const lathe_ray_contour *contour;
     uint32_t *chain; /* level-1 edge of ray pair (i, i + 1) */
@@ -15,7 +16,8 @@ typedef struct side {
 } side;
 
 static uint32_t next_edge(const lathe_ray_contour *c, uint32_t edge) { return edge + 1 < c->count ? edge + 1 : 0; }
-/* Whether an element leads outward. Rounded radii may be equal where the crossings are not: a single edge has its type. */
+/* Whether an element leads outward. Rounded radii may be equal where the crossings are not: a single edge has its
+ * type. */
 static bool further_out(const lathe_ray_contour *c, uint32_t from, uint32_t to) {
     if (next_edge(c, from) == to) return c->types[from] == LATHE_UP_O || c->types[from] == LATHE_UP_I;
     return c->radius[to] > c->radius[from];
@@ -52,8 +54,9 @@ static uint32_t nearest_edge(const lathe_ray_contour *c, uint32_t ray, const lat
     return best;
 }
 
-/* The best chain through the anchor in one walk round the contour: of each unwrapped level only the cheapest way to reach it
- * so far is kept. A way is always found: from the anchor's end the walk passes every level before it comes round. */
+/* The best chain through the anchor in one walk round the contour: of each unwrapped level only the cheapest way to
+ * reach it so far is kept. A way is always found: from the anchor's end the walk passes every level before it comes
+ * round. */
 static lathe_status choose_chain(side *s, lathe_arena *arena, const side *other) {
     const lathe_ray_contour *c = s->contour;
     uint32_t rays = c->rays, *reached = LATHE_NEW(arena, uint32_t, rays),

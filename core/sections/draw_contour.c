@@ -184,7 +184,8 @@ typedef struct layout {
     double slots, left, bottom;
 } layout;
 
-/* A leaf takes a slot; a node lies over the middle of its children. Level-1 nodes go on in a new row where one is full. */
+/* A leaf takes a slot; a node lies over the middle of its children. Level-1 nodes go on in a new row where one is
+ * full. */
 static bool place_nodes(layout *l, const lathe_derivation *t) {
     uint32_t n = t->node_count, row = 0, deepest = 1;
     l->x = calloc(n, sizeof *l->x);

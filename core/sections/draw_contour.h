@@ -16,10 +16,10 @@ typedef struct lathe_drawing {
     const char *title;            /* plain text */
 } lathe_drawing;
 
-/* Left: region, loops, centre, rays, crossings (IN-OUT filled, OUT-IN hollow), edges in four colours, level-1 edges thicker.
- * Right: the derivation tree with figure 9's nodes (root: double circle, level-1: square, internal: diamond, leaf: circle), level-1
- * nodes in rows. Below: what the signs mean. Each edge of the contour is one <line> of class for, back, up or down; each leaf of
- * the tree one <circle> of class leaf. *svg is malloc'ed, zero-terminated, the caller's. LIMIT: more than LATHE_DRAW_MAX_EDGES
- * edges. MEMORY. */
+/* Left: region, loops, centre, rays, crossings (IN-OUT filled, OUT-IN hollow), edges in four colours, level-1 edges
+ * thicker. Right: the derivation tree with figure 9's nodes (root: double circle, level-1: square, internal: diamond,
+ * leaf: circle), level-1 nodes in rows. Below: what the signs mean. Each edge of the contour is one <line> of class
+ * for, back, up or down; each leaf of the tree one <circle> of class leaf. *svg is malloc'ed, zero-terminated, the
+ * caller's. LIMIT: more than LATHE_DRAW_MAX_EDGES edges. MEMORY. */
 lathe_status lathe__draw_contour(char **svg, size_t *size, const lathe_drawing *drawing);
 #endif

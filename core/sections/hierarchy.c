@@ -199,7 +199,10 @@ static lathe_status expand(resolver *r, lathe_piece piece) {
     lathe_piece_node *node = &r->tree.nodes[piece];
     lathe_octangle bound[2];
     node->expanded = true;
-    if (r->attribute > node->attribute) r->counts.inherited++;
+    if (r->attribute > node->attribute) {
+        r->counts.inherited++;
+        node->early = true;
+    }
     node->attribute = r->attribute;
     if (!node->group) change_area(r, node);
     lathe_status status = LATHE_OK;
@@ -349,6 +352,20 @@ static lathe_status count_unresolved(resolver *r) {
     return LATHE_OK;
 }
 
+/* What would be left if the children of early pieces inherited, too. */
+static lathe_status count_printed(resolver *r) {
+    const lathe_piece_node *nodes = r->tree.nodes;
+    uint32_t n = r->tree.node_count;
+    double *values = LATHE_NEW(r->arena, double, n);
+    if (!values) return LATHE_ERR_MEMORY;
+    for (uint32_t i = 0; i < n; i++) values[i] = nodes[i].attribute;
+    for (uint32_t i = 0; i < n; i++)
+        for (int k = 0; k < 2; k++)
+            if (nodes[i].early && !is_edge(nodes[i].child[k])) values[nodes[i].child[k]] = values[i];
+    r->counts.printed = distinct(values, n) + 1;
+    return LATHE_OK;
+}
+
 static lathe_status write_result(lathe_hierarchy *out, lathe_arena *arena, const resolver *r, const lathe_outline *outline) {
     const lathe_piece_tree *tree = &r->tree;
     uint32_t n = tree->point_count;
@@ -388,6 +405,7 @@ lathe_status lathe__hierarchy_build_within(lathe_hierarchy *out, lathe_arena *ar
         if (!status && done) status = resolve(&r);
         else if (!status) give_up(&r, INFINITY);
     }
+    if (!status) status = count_printed(&r);
     if (!status) status = write_result(out, arena, &r, outline);
     free(r.links);
     free(r.pieces.items);

@@ -8,6 +8,7 @@ typedef struct lathe_hierarchy_counts {
     uint32_t plain;            /* possible representations by Douglas-Peucker's errors alone: distinct ones, and the whole outline */
     uint32_t adjusted;         /* with no child's attribute above its parent's ("natural") */
     uint32_t resolved;         /* without intersections; = tolerance_count */
+    uint32_t printed;          /* the same if the children of early pieces inherited, too, as RESOLVE_TREE has it in print [H 2.3] */
     uint32_t inherited;        /* pieces expanded earlier than by their own error */
     uint64_t octangle_tests;   /* pairs of pieces whose octangles were compared */
     uint64_t chord_tests;      /* pairs whose chords were compared as well */

@@ -1,5 +1,5 @@
-/* The paper's grammar by a chart (see paper_grammar.h). Productions of three symbols go through a symbol of their own for the
- * first two. */
+/* The paper's grammar by a chart (see paper_grammar.h). Productions of three symbols go through a symbol of their own
+ * for the first two. */
 #include "paper_grammar.h"
 
 #define NONE UINT32_MAX

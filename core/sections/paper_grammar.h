@@ -1,5 +1,6 @@
-/* The paper's own grammar G [M theorem 1] and G' [M 5.1], as printed, for its trees, tables and figures. Not a gate for real data:
- * theorem 1 is false (counts in tests/test_paper_grammar.c), core/grammar.c and derivation.h take every contour.
+/* The paper's own grammar G [M theorem 1] and G' [M 5.1], as printed, for its trees, tables and figures. Not a gate
+ * for real data: theorem 1 is false (counts in tests/test_paper_grammar.c), core/grammar.c and derivation.h take every
+ * contour.
  *
  *   P1  S -> F ... F (as many as rays)         P7  U -> U U | D U | U D | U_O U_I
  *   P2  F -> D F U | D F | F U | f             P8  U_I -> B U_I F | U_I D | u_i
@@ -8,8 +9,8 @@
  *   P5  D_I -> F D_I B | D_I U_R | d_i         P11 U_R -> U_I U_O
  *   P6  D_O -> B D_O F | D_O U | d_o           P2' F -> F F   P3' B -> B B   (G'); F -> F D (our extension)
  *
- * G is ambiguous, so strings are parsed with a chart over all substrings of the cyclic string (Cocke, Younger, Kasami; the
- * products of two cells by table): time count^3, memory count^2, hence the limit. */
+ * G is ambiguous, so strings are parsed with a chart over all substrings of the cyclic string (Cocke, Younger, Kasami;
+ * the products of two cells by table): time count^3, memory count^2, hence the limit. */
 #ifndef LATHE_PAPER_GRAMMAR_H
 #define LATHE_PAPER_GRAMMAR_H
 #include "contour.h"
@@ -67,8 +68,8 @@ typedef struct lathe_paper_tree {
     uint32_t node_count;
     lathe_paper_node *nodes;
 } lathe_paper_tree; /* node 0: the root */
-/* One derivation tree of (start, length) from a symbol; of several, the one whose productions come first in the list above and
- * whose first symbols are the shortest. symbol S: length must be count; rays as above (else not read).
+/* One derivation tree of (start, length) from a symbol; of several, the one whose productions come first in the list
+ * above and whose first symbols are the shortest. symbol S: length must be count; rays as above (else not read).
  * FORMAT if there is none. Arena memory. MEMORY. */
 lathe_status lathe__paper_tree_make(lathe_paper_tree *out, lathe_arena *arena, const lathe_paper_chart *chart,
                                     lathe_paper_symbol symbol, uint32_t start, uint32_t length, uint32_t rays);

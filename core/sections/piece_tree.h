@@ -20,6 +20,7 @@ typedef struct lathe_piece_node {
     bool group;                /* no piece: two groups of loops, or the two halves of one loop */
     bool forced;               /* its chord would change what lies inside what: always expanded */
     bool expanded;
+    bool early;                /* expanded at a greater tolerance than its own error asks for */
 } lathe_piece_node;
 
 typedef struct lathe_piece_tree {

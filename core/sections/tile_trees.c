@@ -1,14 +1,15 @@
 /* Min-Lee's tiling: the right tree of one contour walked together with the left tree of its neighbour [M 4.1, 4.5].
  *
- * The level-1 edges of a ray pair correspond. On each ray the two folds are lists of elements O, I, O, I ... (both parts
- * together: which of them case 3 calls D or U does not matter here); elements of one symbol may correspond, in order, the
- * nearest first of all (ambiguous case 2). Two corresponding excursions have corresponding first and last edges and are lists
- * again; an excursion against a single edge is searched for that edge (4.5 C). What remains unmatched keeps one vertex of the
- * other contour: first the run of a, on the end of its last correspondence, then the run of b [4.1].
+ * The level-1 edges of a ray pair correspond. On each ray the two folds are lists of elements O, I, O, I ... (both
+ * parts together: which of them case 3 calls D or U does not matter here); elements of one symbol may correspond, in
+ * order, the nearest first of all (ambiguous case 2). Two corresponding excursions have corresponding first and last
+ * edges and are lists again; an excursion against a single edge is searched for that edge (4.5 C). What remains
+ * unmatched keeps one vertex of the other contour: first the run of a, on the end of its last correspondence, then the
+ * run of b [4.1].
  *
- * Two lists, the shorter of at most ALIGN elements, are matched at best: as many elements as possible, then the least sum of
- * distances, in ALIGN steps an element. Longer lists are matched greedily with a look ahead of one pair. All else is linear.
- * Work is kept on a stack of its own: folds can be as deep as a contour is long. */
+ * Two lists, the shorter of at most ALIGN elements, are matched at best: as many elements as possible, then the least
+ * sum of distances, in ALIGN steps an element. Longer lists are matched greedily with a look ahead of one pair. All
+ * else is linear. Work is kept on a stack of its own: folds can be as deep as a contour is long. */
 #include "derivation.h"
 
 #define NONE UINT32_MAX
