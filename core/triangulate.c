@@ -5,7 +5,7 @@
 #include "overlay.h"
 #include <string.h>
 
-enum { NONE = 0xffffffffu, PLACES_PER_CELL = 4, FLIP_TURNS = 48 };
+enum { NONE = 0xffffffffu, BRIDGE = 0x80000000u, PLACES_PER_CELL = 4, FLIP_TURNS = 48 };
 
 typedef struct bridge {        /* one of those that pass a row of the grid */
     uint32_t edge;
@@ -16,6 +16,9 @@ typedef struct ring {
     uint32_t *node, *next, *prev;  /* places of one doubly linked ring */
     uint32_t *end;                 /* where the edge that begins in a place ended before there were bridges */
     uint32_t *twin;                /* next place of the same node, cyclically: bridges begin and end in places of their own */
+    uint32_t *across;              /* what lies beyond the edge that begins in a place: a corner of a triangle; BRIDGE + the place where
+                                    * the same bridge begins on its other side; NONE */
+    uint32_t *neighbour;           /* of corners */
     lathe_point *at;               /* place -> position */
     uint32_t places;
     const lathe_point *positions;  /* node -> position */
@@ -35,6 +38,7 @@ static bool same(const ring *r, uint32_t a, uint32_t b) { return r->at[a].x == r
 static uint32_t add_place(ring *r, uint32_t node) {
     r->node[r->places] = node;
     r->twin[r->places] = r->places;
+    r->across[r->places] = NONE;
     r->at[r->places] = r->positions[node];
     return r->places++;
 }
@@ -122,6 +126,11 @@ static lathe_status bridge_hole(ring *r, lathe_arena *arena, uint32_t leftmost) 
     link_places(r, left2, place2);
     link_places(r, place2, after);
     r->end[left2] = place2;
+    uint32_t beyond = r->across[place];
+    if (beyond != NONE) r->across[beyond - BRIDGE] = BRIDGE + place2;
+    r->across[place2] = beyond;
+    r->across[place] = BRIDGE + left2;
+    r->across[left2] = BRIDGE + place;
     lathe_range box = lathe__range_of(r->at[place], r->at[leftmost]);
     for (int32_t y = box.y0 >> r->grid.shift; y <= box.y1 >> r->grid.shift; y++) {
         bridge *b = LATHE_NEW(arena, bridge, 1), **row = &r->bridges[y - r->grid.cells.y0];
@@ -158,11 +167,29 @@ static bool proper(const ring *r, uint32_t place) {
     return a != b && b != c && c != a;
 }
 
+static void join(uint32_t *neighbour, uint32_t a, uint32_t b) {
+    neighbour[a] = b;
+    if (b != NONE) neighbour[b] = a;
+}
+
+/* The edge that begins in a place becomes one of a triangle, from this corner to the next. */
+static void use_edge(ring *r, uint32_t place, uint32_t corner) {
+    uint32_t beyond = r->across[place];
+    if (beyond < BRIDGE || beyond == NONE) join(r->neighbour, corner, beyond);
+    else r->across[beyond - BRIDGE] = corner;
+}
+
 /* Cuts off a place's triangle. */
-static void cut(const ring *r, uint32_t place, uint32_t triangle[3]) {
-    triangle[0] = r->node[r->prev[place]];
-    triangle[1] = r->node[place];
-    triangle[2] = r->node[r->next[place]];
+static void cut(ring *r, uint32_t place, uint32_t (*triangles)[3], uint32_t index) {
+    uint32_t p = r->prev[place], n = r->next[place], *t = triangles[index];
+    t[0] = r->node[p];
+    t[1] = r->node[place];
+    t[2] = r->node[n];
+    use_edge(r, p, index * 3);
+    use_edge(r, place, index * 3 + 1);
+    r->across[p] = index * 3 + 2;
+    link_places(r, p, n);
+    r->next[place] = NONE;
 }
 
 /* No ear anywhere: rounding has folded the polygon. Any convex place serves, else any proper one. */
@@ -191,48 +218,21 @@ static uint32_t clip_ears(ring *r, uint32_t *queue, uint32_t (*triangles)[3]) {
             place = least_bad(r, alive, left);
         }
         uint32_t p = r->prev[place], n = r->next[place];
-        cut(r, place, triangles[count++]);
-        link_places(r, p, n);
-        r->next[place] = NONE;
+        cut(r, place, triangles, count++);
         queue[tail++] = p;
         queue[tail++] = alive = n;
         left--;
     }
-    cut(r, alive, triangles[count++]);
-    return count;
+    uint32_t last = r->next[alive];
+    cut(r, r->prev[last], triangles, count);
+    use_edge(r, last, count * 3 + 2);
+    return count + 1;
 }
 
 /* ---- Delaunay flips ---- */
 
 /* The next corner of the same triangle: corners are numbered 3 * triangle + k. */
 static uint32_t turned(uint32_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
-
-static void join(uint32_t *neighbour, uint32_t a, uint32_t b) {
-    neighbour[a] = b;
-    if (b != UINT32_MAX) neighbour[b] = a;
-}
-
-static bool find_neighbours(uint32_t *neighbour, lathe_arena *arena, const uint32_t *corner, uint32_t count) {
-    uint32_t size = 16;
-    while (size < count * 6) size *= 2;
-    uint32_t *table = LATHE_NEW(arena, uint32_t, size);
-    if (!table) return false;
-    for (uint32_t i = 0; i < size; i++) table[i] = UINT32_MAX;
-    for (uint32_t i = 0; i < count * 3; i++) neighbour[i] = UINT32_MAX;
-    for (uint32_t i = 0; i < count * 3; i++) {
-        uint32_t a = corner[i], b = corner[turned(i)], low = a < b ? a : b, high = a < b ? b : a;
-        uint32_t h = (low * 2654435761u ^ high * 2246822519u);
-        for (h = (h ^ h >> 15) & (size - 1);; h = (h + 1) & (size - 1)) {
-            uint32_t other = table[h];
-            if (other == UINT32_MAX) { table[h] = i; break; }
-            if (corner[other] == b && corner[turned(other)] == a && neighbour[other] == UINT32_MAX) {
-                join(neighbour, i, other);
-                break;
-            }
-        }
-    }
-    return true;
-}
 
 /* d inside the circle of the counter-clockwise triangle a b c? Doubles in a fixed order: the same on every platform. */
 static bool in_circle(lathe_point a, lathe_point b, lathe_point c, lathe_point d) {
@@ -297,7 +297,7 @@ lathe_status lathe__triangulate(uint32_t (**triangles)[3], uint32_t **neighbour,
     uint32_t places = nodes + 2 * holes, want = places - 2;
     ring r = {.positions = polygon->at};
     r.at = LATHE_NEW(arena, lathe_point, places);
-    uint32_t *room = LATHE_NEW(arena, uint32_t, (size_t)places * 8 + holes + 1);
+    uint32_t *room = LATHE_NEW(arena, uint32_t, (size_t)places * 9 + holes + 1);
     *triangles = lathe__arena_alloc(arena, want, sizeof **triangles);
     *neighbour = LATHE_NEW(arena, uint32_t, (size_t)want * 3);
     if (!r.at || !room || !*triangles || !*neighbour) return LATHE_ERR_MEMORY;
@@ -306,14 +306,15 @@ lathe_status lathe__triangulate(uint32_t (**triangles)[3], uint32_t **neighbour,
     r.prev = room + 2 * (size_t)places;
     r.end = room + 3 * (size_t)places;
     r.twin = room + 4 * (size_t)places;
-    uint32_t *queue = room + 5 * (size_t)places, *hole = room + 8 * (size_t)places;
+    r.across = room + 5 * (size_t)places;
+    r.neighbour = *neighbour;
+    uint32_t *queue = room + 6 * (size_t)places, *hole = room + 9 * (size_t)places;
     for (uint32_t i = 0, begin = 0; i <= holes; begin = polygon->ring_end[i++])
         hole[i] = add_ring(&r, polygon->nodes + begin, polygon->ring_end[i] - begin);
     lathe_status status = build_grid(&r, arena);
     if (!status && holes) status = bridge_holes(&r, arena, hole + 1, holes);
     if (status) return status;
     *count = clip_ears(&r, queue, *triangles);
-    if (!find_neighbours(*neighbour, arena, **triangles, *count)) return LATHE_ERR_MEMORY;
     flip(**triangles, *neighbour, polygon->at, *count);
     return LATHE_OK;
 }

@@ -4,6 +4,7 @@
 #include "mesh.h"
 #include "reconstruct.h"
 #include "smooth.h"
+#include "twist.h"
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -15,7 +16,8 @@ typedef struct reconstruct_job {
     bool has_iso, has_label, json, quiet;
     int axis;                  /* -1: auto */
     int64_t smooth;            /* pieces of an edge; 0: flat triangles */
-    double tolerance;          /* mm: fewer points first; 0: all */
+    double tolerance, strip;   /* mm: fewer points first, by the hierarchy or by strips; 0: all */
+    lathe_twist twist;
     lathe_reconstruct_options options;
 } reconstruct_job;
 
@@ -205,7 +207,7 @@ static int choose(const char *text, const char *const *names, int count) {
 }
 
 typedef struct reconstruct_texts {
-    const char *output, *format, *iso, *label, *axis, *tiling, *links, *threshold, *branching, *mid, *rays, *smooth, *hierarchy;
+    const char *output, *format, *iso, *label, *axis, *tiling, *links, *threshold, *branching, *mid, *rays, *smooth, *hierarchy, *strip, *twist;
 } reconstruct_texts;
 
 static int parse_methods(reconstruct_job *job, const lathe_command *command, const reconstruct_texts *t) {
@@ -251,9 +253,27 @@ static int parse_input(reconstruct_job *job, const lathe_command *command, const
         return lathe__usage_error(command, "--smooth %s: 1 to %d", t->smooth, LATHE_SMOOTH_MAX);
     if (t->hierarchy && (!lathe__option_number(&job->tolerance, t->hierarchy) || job->tolerance <= 0))
         return lathe__usage_error(command, "--hierarchy %s: a number of mm above 0", t->hierarchy);
+    if (t->strip && (!lathe__option_number(&job->strip, t->strip) || job->strip <= 0))
+        return lathe__usage_error(command, "--strip %s: a number of mm above 0", t->strip);
+    lathe_error err;
+    if (t->twist && lathe__parse_twist(&job->twist, t->twist, &err)) return lathe__usage_error(command, "--twist %s: %s", t->twist, err.text);
     job->has_iso = t->iso != NULL;
     job->has_label = t->label != NULL;
     return LATHE_PARSED;
+}
+
+/* Fewer points, and rays that turn with the shape. */
+static int prepare(lathe_contour_set *set, reconstruct_job *job) {
+    lathe_status status = LATHE_OK;
+    if (job->strip > 0) status = lathe__contour_set_strip(set, job->strip);
+    if (!status && job->tolerance > 0) status = lathe__contour_set_simplify(set, job->tolerance);
+    if (job->strip > 0 || job->tolerance > 0) job->options.lattice = false;
+    if (!status && job->twist.method != LATHE_TWIST_NONE) {
+        uint32_t **turns;
+        status = lathe__turn_sections(&turns, &set->arena, set->sections, set->count, &job->twist);
+        job->options.turns = (const uint32_t *const *)turns;
+    }
+    return status ? lathe__status_error("reconstruct", job->input, status, NULL) : LATHE_EXIT_OK;
 }
 
 static int run(int argc, char **argv) {
@@ -267,7 +287,8 @@ static int run(int argc, char **argv) {
         LATHE_OPTION_TEXT("links", 0, &t.links),           LATHE_OPTION_TEXT("threshold", 0, &t.threshold),
         LATHE_OPTION_TEXT("branching", 0, &t.branching),   LATHE_OPTION_TEXT("mid-slices", 0, &t.mid),
         LATHE_OPTION_TEXT("rays", 0, &t.rays),             LATHE_OPTION_TEXT("smooth", 0, &t.smooth),
-        LATHE_OPTION_TEXT("hierarchy", 0, &t.hierarchy),
+        LATHE_OPTION_TEXT("hierarchy", 0, &t.hierarchy),   LATHE_OPTION_TEXT("strip", 0, &t.strip),
+        LATHE_OPTION_TEXT("twist", 0, &t.twist),
         LATHE_OPTION_FLAG("quiet", &job.quiet, true),
     };
     memset(&t, 0, sizeof t);
@@ -281,11 +302,7 @@ static int run(int argc, char **argv) {
     lathe_contour_set set;
     memset(&set, 0, sizeof set);
     status = lathe__is_contour_json(job.input) ? read_contours(&set, &job) : read_volume(&set, &job);
-    if (status == LATHE_EXIT_OK && job.tolerance > 0) {
-        lathe_status simplified = lathe__contour_set_simplify(&set, job.tolerance);
-        if (simplified) status = lathe__status_error("reconstruct", job.input, simplified, NULL);
-        job.options.lattice = false;
-    }
+    if (status == LATHE_EXIT_OK) status = prepare(&set, &job);
     if (status == LATHE_EXIT_OK) status = reconstruct_set(&job, &set);
     lathe__contour_set_free(&set);
     return status;
@@ -306,6 +323,8 @@ const lathe_command lathe__command_reconstruct = {
     "      --branching B         overlay (default), paper (exterior and interior polygons)\n"
     "      --mid-slices M        --branching paper: never (default), wide (copies in the middle of high slabs)\n"
     "      --hierarchy MM        first fewer points: edges within MM of the contours, by the hierarchy without intersections\n"
+    "      --strip MM            first polygons instead of staircases: chords within MM of the contours\n"
+    "      --twist none|DEG|auto trees: rays turn from slice to slice with the shape\n"
     "      --smooth K            writes the smooth surface, every edge in K pieces (1 to 16)\n"
     "  -f, --format F            default: what OUT ends with\n"
     "      --quiet               no report\n"

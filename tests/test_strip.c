@@ -2,6 +2,8 @@
 #include <math.h>
 #include <stdlib.h>
 #include "check.h"
+#include "closing.h"
+#include "mask.h"
 #include "strip.h"
 
 enum { POINTS = 1001 };
@@ -118,8 +120,87 @@ static void small_inputs(void) {
     CHECK_EQ(n, 3);
 }
 
+/* ---- outlines of pixel regions ---- */
+
+static void random_slice(lathe_mask *mask, int size, uint32_t density) {
+    int32_t dims[3] = {size + 2, size + 2, 1}, origin[3] = {0, 0, 0};
+    if (lathe__mask_new(mask, dims, origin)) abort();
+    for (int v = 1; v <= size; v++)
+        for (int u = 1; u <= size; u++) {
+            /* Rings and blobs with noisy borders. */
+            double x = u - size / 2.0, y = v - size / 2.0, r = hypot(x, y) + (next_random() % 100) / 100.0 * density / 30;
+            if (fmod(r, 7) < 4 || next_random() % 100 < density / 10) mask->bits[(size_t)v * (size_t)mask->row_words + (size_t)(u >> 6)] |= (uint64_t)1 << (u & 63);
+        }
+}
+
+static int within(const lathe_outline *o, lathe_point p) {
+    int odd = 0;
+    for (uint32_t l = 0; l < o->loop_count; l++)
+        for (uint32_t i = 0, k = o->loops[l].count - 1; i < o->loops[l].count; k = i++) {
+            lathe_point a = o->points[o->loops[l].first + i], b = o->points[o->loops[l].first + k];
+            if ((a.y > p.y) != (b.y > p.y) && (double)(b.x - a.x) * (p.y - a.y) / (b.y - a.y) + a.x > p.x) odd ^= 1;
+        }
+    return odd;
+}
+
+static int simple_outline(const lathe_outline *o) {
+    for (uint32_t l = 0; l < o->loop_count; l++)
+        for (uint32_t i = 0; i < o->loops[l].count; i++)
+            for (uint32_t m = l; m < o->loop_count; m++)
+                for (uint32_t k = m == l ? i + 1 : 0; k < o->loops[m].count; k++) {
+                    uint32_t n1 = o->loops[l].count, n2 = o->loops[m].count;
+                    if (m == l && ((i + 1) % n1 == k || (k + 1) % n2 == i)) continue;
+                    const lathe_point *p = o->points + o->loops[l].first, *q = o->points + o->loops[m].first;
+                    if (lathe__edges_meet(p[i], p[(i + 1) % n1], q[k], q[(k + 1) % n2])) return 0;
+                }
+    return 1;
+}
+
+static double distance_to_loop(const lathe_outline *o, uint32_t l, lathe_point p) {
+    double best = INFINITY, at[2] = {p.x, p.y};
+    for (uint32_t i = 0, k = o->loops[l].count - 1; i < o->loops[l].count; k = i++) {
+        lathe_point a = o->points[o->loops[l].first + i], b = o->points[o->loops[l].first + k];
+        best = fmin(best, lathe__segment_distance(at, (double[]){a.x, a.y}, (double[]){b.x, b.y}));
+    }
+    return best;
+}
+
+static void outlines(void) {
+    lathe_arena arena = {0};
+    uint64_t before = 0, later = 0;
+    for (int round = 0; round < 400; round++) {
+        lathe_mask mask;
+        lathe_outline whole, less;
+        int32_t *border, tolerance = (int32_t)(LATHE_LATTICE_ONE * (0.3 + (next_random() % 200) / 100.0));
+        random_slice(&mask, 8 + (int)(next_random() % 24), next_random() % 100);
+        lathe_slice_view view = {.pixels = mask.bits, .width = mask.size[0], .height = mask.size[1], .row_words = mask.row_words, .fraction = 32};
+        CHECK(!lathe__trace_outline(&whole, &border, &arena, &view));
+        if (CHECK(!lathe__strip_outline(&less, &arena, &whole, tolerance)) && whole.loop_count) {
+            double most = 0;
+            int same = 1;
+            for (uint32_t l = 0; l < whole.loop_count; l++)
+                for (uint32_t i = 0; i < whole.loops[l].count; i++)
+                    most = fmax(most, distance_to_loop(&less, l, whole.points[whole.loops[l].first + i]));
+            /* Just beside each loop's first edge, on its left: inside in both. */
+            for (uint32_t l = 0; l < less.loop_count; l++) {
+                lathe_point a = less.points[less.loops[l].first], b = less.points[less.loops[l].first + 1];
+                double dx = b.x - (double)a.x, dy = b.y - (double)a.y, d = hypot(dx, dy);
+                same &= within(&less, (lathe_point){(int32_t)((a.x + b.x) / 2.0 - dy / d * 40), (int32_t)((a.y + b.y) / 2.0 + dx / d * 40)});
+            }
+            CHECK(most <= tolerance + 1 && same && simple_outline(&less));
+            before += whole.point_count;
+            later += less.point_count;
+        }
+        lathe__mask_free(&mask);
+        lathe__arena_reset(&arena);
+    }
+    CHECK(later * 2 < before);
+    lathe__arena_free(&arena);
+}
+
 int main(void) {
     table();
+    outlines();
     bounds();
     small_inputs();
     return check_end();

@@ -1,4 +1,5 @@
 #include "contour_set.h"
+#include "strip.h"
 #include "grid.h"
 #include "hierarchy.h"
 #include <math.h>
@@ -329,10 +330,27 @@ lathe_status lathe__contour_set_of_mask(lathe_contour_set *out, const lathe_mask
     return status;
 }
 
-lathe_status lathe__contour_set_simplify(lathe_contour_set *set, double tolerance_mm) {
+/* A lattice unit's length in the slice plane, mm; the shorter side of a pixel. */
+static double unit_of(const lathe_contour_set *set) {
     const double(*m)[4] = set->transform.m;
-    double unit = sqrt(fmin(m[0][0] * m[0][0] + m[1][0] * m[1][0] + m[2][0] * m[2][0], m[0][1] * m[0][1] + m[1][1] * m[1][1] + m[2][1] * m[2][1]));
-    double tolerance = tolerance_mm / unit;
+    return sqrt(fmin(m[0][0] * m[0][0] + m[1][0] * m[1][0] + m[2][0] * m[2][0], m[0][1] * m[0][1] + m[1][1] * m[1][1] + m[2][1] * m[2][1]));
+}
+
+lathe_status lathe__contour_set_strip(lathe_contour_set *set, double tolerance_mm) {
+    double tolerance = tolerance_mm / unit_of(set);
+    if (!(tolerance >= 1)) return LATHE_OK;
+    lathe_status status = LATHE_OK;
+    for (uint32_t s = 0; !status && s < set->count; s++) {
+        lathe_outline less;
+        if (!set->sections[s].outline.point_count) continue;
+        status = lathe__strip_outline(&less, &set->arena, &set->sections[s].outline, tolerance > 1e9 ? 1000000000 : (int32_t)tolerance);
+        if (!status) set->sections[s].outline = less;
+    }
+    return status;
+}
+
+lathe_status lathe__contour_set_simplify(lathe_contour_set *set, double tolerance_mm) {
+    double tolerance = tolerance_mm / unit_of(set);
     if (!(tolerance >= 1)) return LATHE_OK;   /* finer than the lattice */
     lathe_status status = LATHE_OK;
     for (uint32_t s = 0; !status && s < set->count; s++) {

@@ -59,6 +59,7 @@ static uint32_t nearest_edge(const lathe_ray_contour *c, uint32_t ray, const lat
  * round. */
 static lathe_status choose_chain(side *s, lathe_arena *arena, const side *other) {
     const lathe_ray_contour *c = s->contour;
+    if (c->count == c->rays) return LATHE_OK;
     uint32_t rays = c->rays, *reached = LATHE_NEW(arena, uint32_t, rays),
              *before = LATHE_NEW(arena, uint32_t, c->count);
     int64_t *cost = LATHE_NEW(arena, int64_t, rays);
@@ -285,17 +286,28 @@ static lathe_status build_tree(lathe_derivation *out, lathe_arena *arena, side *
 
 /* ---- all of it ---- */
 
+/* One FOR edge for each ray pair and nothing else: once round, and no choice. */
+static bool is_star(const lathe_ray_contour *c) {
+    if (c->count != c->rays) return false;
+    for (uint32_t e = 0; e < c->count; e++)
+        if (c->types[e] != LATHE_FOR) return false;
+    return true;
+}
 /* Begins with the record chain, which is there for every contour. */
 static lathe_status begin_side(side *s, lathe_arena *arena, const lathe_ray_contour *c) {
-    lathe_tree records;
     if (c->count > MAX_EDGES) return LATHE_ERR_RANGE;
-    lathe_status status = lathe__parse_contour(&records, arena, c->crossings, c->types, c->count, c->rays);
-    if (status) return status;
     *s = (side){.contour = c, .work = 3 * (uint64_t)c->count};
     s->chain = LATHE_NEW(arena, uint32_t, c->rays);
     s->split = LATHE_NEW(arena, uint32_t, c->rays);
     s->mask = LATHE_NEW(arena, uint8_t, c->rays);
     if (!s->chain || !s->split || !s->mask) return LATHE_ERR_MEMORY;
+    if (is_star(c)) {
+        for (uint32_t e = 0; e < c->count; e++) s->chain[c->crossings[e].ray] = e;
+        return LATHE_OK;
+    }
+    lathe_tree records;
+    lathe_status status = lathe__parse_contour(&records, arena, c->crossings, c->types, c->count, c->rays);
+    if (status) return status;
     for (uint32_t i = 0; i < c->rays; i++) s->chain[i] = (records.start + records.main_edge[i]) % c->count;
     return LATHE_OK;
 }
