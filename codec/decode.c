@@ -5,7 +5,7 @@
 #include "structure_state.h"
 
 /* restream.h, which is not in the small decoder. */
-const lathe_structure_state *lathe__decoder_state(const lathe_decoder *d, uint32_t structure);
+lathe_structure_state *lathe__decoder_state(lathe_decoder *d, uint32_t structure);
 
 struct lathe_decoder {
     uint8_t *bytes;
@@ -184,17 +184,6 @@ const lathe_transform *lathe_decoder_transform(const lathe_decoder *d, uint32_t 
     return d->has_header && structure < d->header.structure_count ? &d->transforms[structure] : NULL;
 }
 
-bool lathe_decoder_voxels(const lathe_decoder *d, uint32_t structure, lathe_voxels *out) {
-    if (!d->has_header || structure >= d->header.structure_count) return false;
-    const lathe_structure_state *s = &d->states[structure];
-    *out = (lathe_voxels){.row_words = s->mask.row_words, .fraction = s->fraction, .bits = s->mask.bits};
-    for (int k = 0; k < 3; k++) {
-        out->size[k] = s->mask.size[k];
-        out->origin[k] = s->mask.origin[k];
-    }
-    return true;
-}
-
 uint32_t lathe_decoder_structures(const lathe_decoder *d) { return d->has_header ? d->header.structure_count : 0; }
 
 const char *lathe_decoder_error(const lathe_decoder *d) {
@@ -202,4 +191,4 @@ const char *lathe_decoder_error(const lathe_decoder *d) {
     return *d->fault ? d->fault : lathe_status_name(d->failure);
 }
 
-const lathe_structure_state *lathe__decoder_state(const lathe_decoder *d, uint32_t structure) { return &d->states[structure]; }
+lathe_structure_state *lathe__decoder_state(lathe_decoder *d, uint32_t structure) { return &d->states[structure]; }

@@ -40,7 +40,7 @@ typedef struct lathe_voxels {
     const uint64_t *bits;          /* the decoder's, until it closes; NULL: no slice yet */
 } lathe_voxels;
 /* False until the header is in, or if there is no such structure. */
-bool lathe_decoder_voxels(const lathe_decoder *decoder, uint32_t structure, lathe_voxels *out);
+bool lathe_decoder_voxels(lathe_decoder *decoder, uint32_t structure, lathe_voxels *out);
 uint32_t lathe_decoder_structures(const lathe_decoder *decoder);      /* 0 until the header is in */
 const char *lathe_decoder_error(const lathe_decoder *decoder);        /* detail of the failure, "" if none */
 

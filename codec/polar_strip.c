@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const uint32_t MAGIC = 0x3153504c;   /* "LPS1" */
+static const uint32_t MAGIC = 0x3153504c; /* "LPS1" */
 static uint32_t steps_of(uint32_t bits) { return bits == 16 ? 21845 : 1u << 22; }
 
 /* ---- from rays and radii to a contour ---- */
@@ -17,10 +17,12 @@ static void set_vertex(lathe_polar_contour *p, const lathe_polar_stack *s, uint3
     lathe_ray_contour *c = &p->contour;
     double direction[2], radius = ((double)p->steps[i] + 0.5) * s->farthest / steps_of(s->bits);
     lathe__ray_vector(direction, c->crossings[i].ray, c->rays, c->turn);
-    c->points[i] = (lathe_point){on_lattice(c->centre.x + radius * direction[0]), on_lattice(c->centre.y + radius * direction[1])};
+    c->points[i] =
+        (lathe_point){on_lattice(c->centre.x + radius * direction[0]), on_lattice(c->centre.y + radius * direction[1])};
     c->radius[i] = llround(radius);
 }
-/* Rays and steps are there: everything else follows. Crossings leave the region and come back in turn with every edge along a ray. */
+/* Rays and steps are there: everything else follows. Crossings leave the region and come back in turn with every edge
+ * along a ray. */
 static lathe_status settle_contour(lathe_polar_contour *p, const lathe_polar_stack *s, lathe_arena *arena) {
     lathe_ray_contour *c = &p->contour;
     lathe_tree tree;
@@ -52,7 +54,8 @@ static lathe_status make_room(lathe_polar_contour *p, lathe_arena *arena, uint32
 
 /* ---- quantising ---- */
 
-static lathe_status quantise_contour(lathe_polar_contour *out, lathe_polar_stack *s, lathe_arena *arena, const lathe_ray_contour *from) {
+static lathe_status quantise_contour(lathe_polar_contour *out, lathe_polar_stack *s, lathe_arena *arena,
+                                     const lathe_ray_contour *from) {
     uint32_t start = 0, most = steps_of(s->bits);
     while (start < from->count && (from->crossings[start].ray || !from->crossings[start].in_out)) start++;
     if (start == from->count) return LATHE_ERR_FORMAT;
@@ -67,8 +70,8 @@ static lathe_status quantise_contour(lathe_polar_contour *out, lathe_polar_stack
     }
     return settle_contour(out, s, arena);
 }
-lathe_status lathe__polar_quantise(lathe_polar_stack *out, lathe_arena *arena, const lathe_ray_contour *contours, const int32_t *heights,
-                                   uint32_t count, uint32_t bits) {
+lathe_status lathe__polar_quantise(lathe_polar_stack *out, lathe_arena *arena, const lathe_ray_contour *contours,
+                                   const int32_t *heights, uint32_t count, uint32_t bits) {
     if (!count || (bits != 16 && bits != 32)) return LATHE_ERR_RANGE;
     lathe_polar_stack s = {.count = count, .rays = contours[0].rays, .bits = bits, .farthest = 1};
     if (s.rays < 4 || s.rays > 65536 || (s.rays & (s.rays - 1))) return LATHE_ERR_RANGE;
@@ -77,7 +80,8 @@ lathe_status lathe__polar_quantise(lathe_polar_stack *out, lathe_arena *arena, c
         if (contours[k].rays != s.rays) return LATHE_ERR_RANGE;
         edges += contours[k].count;
         for (uint32_t i = 0; i < contours[k].count; i++)
-            if (contours[k].radius[i] >= s.farthest) s.farthest = contours[k].radius[i] < INT32_MAX ? (uint32_t)contours[k].radius[i] + 1 : INT32_MAX;
+            if (contours[k].radius[i] >= s.farthest)
+                s.farthest = contours[k].radius[i] < INT32_MAX ? (uint32_t)contours[k].radius[i] + 1 : INT32_MAX;
     }
     if (edges > LATHE_POLAR_MOST_EDGES) return LATHE_ERR_LIMIT;
     s.contours = LATHE_NEW(arena, lathe_polar_contour, count);
@@ -95,7 +99,8 @@ lathe_status lathe__polar_quantise(lathe_polar_stack *out, lathe_arena *arena, c
 
 size_t lathe__polar_size(const lathe_polar_stack *stack) {
     size_t size = LATHE_POLAR_HEAD;
-    for (uint32_t k = 0; k < stack->count; k++) size += LATHE_POLAR_CONTOUR_HEAD + (size_t)stack->contours[k].contour.count * (stack->bits / 8);
+    for (uint32_t k = 0; k < stack->count; k++)
+        size += LATHE_POLAR_CONTOUR_HEAD + (size_t)stack->contours[k].contour.count * (stack->bits / 8);
     return size;
 }
 static void put(uint8_t **at, uint32_t value, int size) {
@@ -103,7 +108,7 @@ static void put(uint8_t **at, uint32_t value, int size) {
 }
 static uint32_t get(const uint8_t **at, int size) {
     uint32_t value = 0;
-    for (int i = 0; i < size; i++) value |= (uint32_t)*(*at)++ << (8 * i);
+    for (int i = 0; i < size; i++) value |= (uint32_t) * (*at)++ << (8 * i);
     return value;
 }
 /* -1, 0 or 1: the way round from one ray to the next vertex's. */
@@ -165,8 +170,11 @@ void lathe__polar_encode(uint8_t *bytes, const lathe_polar_stack *stack) {
     }
 }
 
-static bool small_enough(int32_t v) { return v > -(LATHE_MAX_DIM + 2) * LATHE_LATTICE_ONE && v < (LATHE_MAX_DIM + 2) * LATHE_LATTICE_ONE; }
-static lathe_status decode_contour(lathe_polar_contour *p, const lathe_polar_stack *s, lathe_arena *arena, const uint8_t **at, const uint8_t *end) {
+static bool small_enough(int32_t v) {
+    return v > -(LATHE_MAX_DIM + 2) * LATHE_LATTICE_ONE && v < (LATHE_MAX_DIM + 2) * LATHE_LATTICE_ONE;
+}
+static lathe_status decode_contour(lathe_polar_contour *p, const lathe_polar_stack *s, lathe_arena *arena,
+                                   const uint8_t **at, const uint8_t *end) {
     if (end - *at < LATHE_POLAR_CONTOUR_HEAD) return LATHE_ERR_FORMAT;
     lathe_ray_contour *c = &p->contour;
     *p = (lathe_polar_contour){0};
@@ -176,7 +184,8 @@ static lathe_status decode_contour(lathe_polar_contour *p, const lathe_polar_sta
     p->height = (int32_t)get(at, 4);
     c->turn = get(at, 2);
     uint32_t zero = get(at, 2), count = get(at, 4), first_step = 0, ray = 0;
-    if (zero || !small_enough(c->centre.x) || !small_enough(c->centre.y) || !small_enough(p->height)) return LATHE_ERR_FORMAT;
+    if (zero || !small_enough(c->centre.x) || !small_enough(c->centre.y) || !small_enough(p->height))
+        return LATHE_ERR_FORMAT;
     if (count < s->rays || count > (size_t)(end - *at) / (s->bits / 8)) return LATHE_ERR_FORMAT;
     lathe_status status = make_room(p, arena, count);
     if (status) return status;
@@ -203,7 +212,8 @@ lathe_status lathe__polar_decode(lathe_polar_stack *out, lathe_arena *arena, con
     s.count = get(&at, 4);
     s.farthest = get(&at, 4);
     zero |= get(&at, 4);
-    if ((s.bits != 16 && s.bits != 32) || log2 < 2 || log2 > 16 || zero || !s.farthest || s.farthest > INT32_MAX) return LATHE_ERR_FORMAT;
+    if ((s.bits != 16 && s.bits != 32) || log2 < 2 || log2 > 16 || zero || !s.farthest || s.farthest > INT32_MAX)
+        return LATHE_ERR_FORMAT;
     s.rays = 1u << log2;
     size_t least = LATHE_POLAR_CONTOUR_HEAD + (size_t)s.rays * (s.bits / 8);
     if (!s.count || s.count > (size - LATHE_POLAR_HEAD) / least) return LATHE_ERR_FORMAT;
@@ -226,7 +236,8 @@ static void add(lathe_mesh *m, uint32_t a, uint32_t b, uint32_t c) {
     uint32_t *t = m->triangles[m->triangle_count++];
     t[0] = a, t[1] = b, t[2] = c;
 }
-static lathe_status add_strip(lathe_mesh *m, lathe_arena *scratch, const lathe_ray_contour *a, const lathe_ray_contour *b, uint32_t first) {
+static lathe_status add_strip(lathe_mesh *m, lathe_arena *scratch, const lathe_ray_contour *a,
+                              const lathe_ray_contour *b, uint32_t first) {
     lathe_tiling tiling;
     lathe__arena_reset(scratch);
     lathe_status status = lathe__tile_trees(&tiling, scratch, a, b);

@@ -45,6 +45,8 @@ lathe_status lathe__radius_walk(lathe_radius_map *map, uint32_t level, const lat
 /* What a row's centre is predicted to be from two known ones; rows low < row < high. */
 int32_t lathe__centre_between(int32_t low, int32_t at_low, int32_t high, int32_t at_high, int32_t row);
 
+/* Where a ray of the last level ends, in lattice units. radius_mesh.c */
+lathe_point lathe__radius_point(const lathe_radius_map *map, int32_t row, uint32_t ray);
 /* The surface at a level: strips between the shown rows, ray by ray, and two fans. radius_mesh.c */
 lathe_status lathe__radius_mesh(lathe_mesh *out, const lathe_radius_map *map, uint32_t level);
 

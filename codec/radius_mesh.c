@@ -8,16 +8,19 @@ static int64_t squared(const int32_t *a, const int32_t *b) {
     return x * x + y * y;
 }
 
-static void place_row(lathe_mesh *mesh, const lathe_radius_map *map, int32_t row, uint32_t stride) {
-    const int32_t *radius = map->radius + (size_t)row * map->rays;
+lathe_point lathe__radius_point(const lathe_radius_map *map, int32_t row, uint32_t ray) {
     uint32_t turn = (uint32_t)map->turn * (uint32_t)row;
+    lathe_point d = lathe__ray_direction((ray * (65536 / map->rays) + turn) & 65535, 65536);
+    int64_t length = (int64_t)map->radius[(size_t)row * map->rays + ray] * (LATHE_LATTICE_ONE / LATHE_RADIUS_ONE);
+    return (lathe_point){map->centre[row][0] * (LATHE_LATTICE_ONE / 2) + (int32_t)(length * d.x / LATHE_RAY_LENGTH),
+                         map->centre[row][1] * (LATHE_LATTICE_ONE / 2) + (int32_t)(length * d.y / LATHE_RAY_LENGTH)};
+}
+
+static void place_row(lathe_mesh *mesh, const lathe_radius_map *map, int32_t row, uint32_t stride) {
     for (uint32_t i = 0; i < map->rays; i += stride) {
-        lathe_point d = lathe__ray_direction((i * (65536 / map->rays) + turn) & 65535, 65536);
         int32_t *v = mesh->lattice[mesh->vertex_count++];
-        int64_t length = (int64_t)radius[i] * (LATHE_LATTICE_ONE / LATHE_RADIUS_ONE);
-        v[0] = map->centre[row][0] * (LATHE_LATTICE_ONE / 2) + (int32_t)(length * d.x / LATHE_RAY_LENGTH);
-        v[1] = map->centre[row][1] * (LATHE_LATTICE_ONE / 2) + (int32_t)(length * d.y / LATHE_RAY_LENGTH);
-        v[2] = row * LATHE_LATTICE_ONE;
+        lathe_point p = lathe__radius_point(map, row, i);
+        v[0] = p.x, v[1] = p.y, v[2] = row * LATHE_LATTICE_ONE;
     }
 }
 

@@ -8,5 +8,5 @@
 lathe_status lathe__restream(lathe_bytes packets[LATHE_MAX_LEVELS], const lathe_model *model, uint32_t structure, uint32_t level_count);
 
 /* decode.c: what a decoder knows of a structure; its own. */
-const lathe_structure_state *lathe__decoder_state(const lathe_decoder *decoder, uint32_t structure);
+lathe_structure_state *lathe__decoder_state(lathe_decoder *decoder, uint32_t structure);
 #endif

@@ -62,7 +62,7 @@ void lathe__state_drop_occupancy(lathe_structure_state *state) {
 /* ---- estimates of level 1's slices ---- */
 
 /* Marks where a row's pixels change from outside to inside or back. */
-static void mark_polygon(const lathe_mask *mask, int32_t slice, const lathe_point *p, uint32_t n) {
+void lathe__mark_polygon(const lathe_mask *mask, int32_t slice, const lathe_point *p, uint32_t n) {
     for (uint32_t i = 0; i < n; i++) {
         lathe_point a = p[i], b = p[i + 1 < n ? i + 1 : 0];
         if (a.y > b.y) { lathe_point swap = a; a = b; b = swap; }
@@ -78,7 +78,7 @@ static void mark_polygon(const lathe_mask *mask, int32_t slice, const lathe_poin
 }
 
 /* Each pixel: the parity of the marks up to it. */
-static void fill_slice(const lathe_mask *mask, int32_t slice) {
+void lathe__fill_slice(const lathe_mask *mask, int32_t slice) {
     uint64_t *word = lathe__mask_slice(mask, slice), inside = 0;
     for (size_t i = 0; i < lathe__mask_slice_words(mask); i++) {
         if (i % (size_t)mask->row_words == 0) inside = 0;
@@ -100,8 +100,8 @@ lathe_status lathe__state_estimate(lathe_structure_state *state, lathe_arena *sc
         lathe_outline outline;
         status = lathe__star_outline(&outline, scratch, &state->base[i], step, i);
         for (uint32_t l = 0; !status && l < outline.loop_count; l++)
-            mark_polygon(&state->estimate, (int32_t)i, outline.points + outline.loops[l].first, outline.loops[l].count);
-        if (!status) fill_slice(&state->estimate, (int32_t)i);
+            lathe__mark_polygon(&state->estimate, (int32_t)i, outline.points + outline.loops[l].first, outline.loops[l].count);
+        if (!status) lathe__fill_slice(&state->estimate, (int32_t)i);
     }
     return status;
 }

@@ -62,6 +62,9 @@ lathe_status lathe__state_mesh(lathe_mesh *out, lathe_arena arena[2], const lath
 /* The structure's occupancy model: its own copy, or the shared one. */
 lathe_status lathe__state_start_occupancy(lathe_structure_state *state, lathe_models *models);
 void lathe__state_drop_occupancy(lathe_structure_state *state);
+/* Pixels of polygons: each polygon of a slice is marked, then the slice is filled; even-odd, pixels whose middle is inside. */
+void lathe__mark_polygon(const lathe_mask *mask, int32_t slice, const lathe_point *polygon, uint32_t count);
+void lathe__fill_slice(const lathe_mask *mask, int32_t slice);
 /* Fills `estimate` from the base shape. */
 lathe_status lathe__state_estimate(lathe_structure_state *state, lathe_arena *scratch);
 /* Numbers that a radius map begins with; encoder and decoder. */

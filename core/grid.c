@@ -23,6 +23,14 @@ bool lathe__segments_meet(const lathe_point *at, uint32_t a, uint32_t b, uint32_
     return !apart(at, a, b, c, d) && !apart(at, c, d, a, b);
 }
 
+bool lathe__comes_close(const lathe_point *at, uint32_t vertex, uint32_t a, uint32_t b, int32_t room) {
+    lathe_point p = at[vertex];
+    lathe_range r = lathe__range_of(at[a], at[b]);
+    if (p.x < r.x0 - room || p.x > r.x1 + room || p.y < r.y0 - room || p.y > r.y1 + room) return false;
+    int64_t turn = lathe__turn(at, a, b, vertex);
+    return (turn < 0 ? -turn : turn) < room * ((int64_t)r.x1 - r.x0 + r.y1 - r.y0);
+}
+
 bool lathe__is_nearer_left(lathe_left *nearest, lathe_point p, lathe_point a, lathe_point b) {
     if (a.y > b.y) { lathe_point swap = a; a = b; b = swap; }
     if (p.y < a.y || p.y >= b.y || (a.x > p.x && b.x > p.x)) return false;

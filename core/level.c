@@ -45,7 +45,8 @@ lathe_status lathe__stack_outlines(lathe_mesh *out, lathe_arena *scratch, const 
     return lathe__stack_with_caps(out, scratch, outlines, heights, count, lattice, NULL, counts);
 }
 
-/* One try to build a slab: RANGE if vertices of the upper outline had to move first, and have. The last try takes what there is. */
+/* One try to build a slab: RANGE if vertices of the upper outline had to move first, and have, away from where the mesh still has
+ * them. The last try takes what there is. */
 static lathe_status overlay_roomy(lathe_mesh_builder *builder, lathe_arena *scratch, lathe_slab *slab, lathe_overlay_counts *counts,
                                   uint32_t tries) {
     const lathe_outline *upper = slab->outline[1];
@@ -56,11 +57,11 @@ static lathe_status overlay_roomy(lathe_mesh_builder *builder, lathe_arena *scra
         memset(slab->crowded, 0, upper->point_count);
     }
     lathe_status status = lathe__overlay_slab(builder, scratch, slab, counts);
-    for (uint32_t i = 0; status == LATHE_ERR_RANGE && i < upper->point_count; i++) {
-        if (!slab->crowded[i]) continue;
+    for (uint32_t i = 0; i < upper->point_count; i++) {
         int32_t *v = builder->mesh.lattice[slab->base[1] + i];
-        lathe_point p = upper->points[i] = lathe__jitter(upper->points[i], tries);
-        v[0] = p.x, v[1] = p.y;
+        lathe_point *p = &upper->points[i];
+        if (status != LATHE_ERR_RANGE) v[0] = p->x, v[1] = p->y;
+        else if (slab->crowded[i]) *p = lathe__jitter((lathe_point){v[0], v[1]}, tries);
     }
     return status;
 }

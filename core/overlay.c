@@ -15,7 +15,7 @@
 #include <string.h>
 
 enum { NONE = 0xffffffffu };
-enum { ROOM = 64 };            /* lattice units: what rounding cannot bridge */
+enum { ROOM = 64, SPACING = 8 }; /* lattice units: what rounding cannot bridge */
 #ifdef LATHE_SMALL
 enum { COUNTED = 0 };          /* nobody asks a small decoder how its joints turned out */
 #else
@@ -117,28 +117,24 @@ static lathe_status add_meeting(overlay *o, uint32_t a, uint32_t b, int64_t d1, 
 static int32_t imin(int32_t a, int32_t b) { return a < b ? a : b; }
 static int32_t imax(int32_t a, int32_t b) { return a > b ? a : b; }
 
-/* Does a vertex come within ROOM of an edge? Or a little farther: lengths are taken as sums. */
-static bool comes_close(const overlay *o, uint32_t vertex, uint32_t edge) {
-    lathe_point p = o->at[vertex];
-    lathe_range r = lathe__range_of(o->at[edge], o->at[o->next[edge]]);
-    if (p.x < r.x0 - ROOM || p.x > r.x1 + ROOM || p.y < r.y0 - ROOM || p.y > r.y1 + ROOM) return false;
-    int64_t turn = lathe__turn(o->at, edge, o->next[edge], vertex);
-    return (turn < 0 ? -turn : turn) < ROOM * ((int64_t)r.x1 - r.x0 + r.y1 - r.y0);
+/* Marks edge b of the upper outline. */
+static void mark_crowded(overlay *o, uint32_t b) {
+    uint8_t *crowded = o->slab->crowded - o->upper;
+    crowded[b] = crowded[o->next[b]] = o->harmed = true;
 }
 
-/* Marks edge b of the upper outline if it and edge a do not leave each other room. */
-static void test_room(overlay *o, uint32_t a, uint32_t b) {
+/* Do edge a and edge b of the upper outline leave each other room? */
+static bool have_room(const overlay *o, uint32_t a, uint32_t b) {
     uint32_t a1 = o->next[a], b1 = o->next[b];
-    if (a == b) return;
-    if (!((b != a1 && comes_close(o, b, a)) || (a != b1 && comes_close(o, a, b)) ||
-          (a >= o->upper && b != a1 && a != b1 && lathe__segments_meet(o->at, a, a1, b, b1)))) return;
-    uint8_t *crowded = o->slab->crowded - o->upper;
-    crowded[b] = crowded[b1] = o->harmed = true;
+    if (a == b) return true;
+    if (b != a1 && lathe__comes_close(o->at, b, a, a1, ROOM)) return false;
+    if (a != b1 && lathe__comes_close(o->at, a, b, b1, ROOM)) return false;
+    return a < o->upper || b == a1 || a == b1 || !lathe__segments_meet(o->at, a, a1, b, b1);
 }
 
 static lathe_status test_edges(overlay *o, uint32_t a, uint32_t b) {
     uint32_t a1 = o->next[a], b1 = o->next[b];
-    if (o->slab->crowded) test_room(o, a, b);
+    if (o->slab->crowded && !have_room(o, a, b)) mark_crowded(o, b);
     if (a >= o->upper) return LATHE_OK;
     int64_t d1 = lathe__turn(o->at, a, a1, b), d2 = lathe__turn(o->at, a, a1, b1);
     if ((d1 > 0) == (d2 > 0)) return LATHE_OK;
@@ -169,10 +165,6 @@ static lathe_range *list_ranges(const overlay *o, bool rows) {
     return ranges;
 }
 
-static bool boxes_touch(const lathe_range *a, const lathe_range *b) {
-    return a->x0 <= b->x1 && b->x0 <= a->x1 && a->y0 <= b->y1 && b->y0 <= a->y1;
-}
-
 static lathe_status find_meetings(overlay *o) {
     uint32_t below = o->slab->crowded ? o->vertices : o->upper;   /* what the upper outline is held against */
     if (!below || o->upper == o->vertices) return LATHE_OK;
@@ -188,7 +180,7 @@ static lathe_status find_meetings(overlay *o) {
                 size_t c = lathe__cell_at(&grid, x, y);
                 for (uint32_t i = grid.first[c]; i < grid.first[c + 1]; i++) {
                     uint32_t e = grid.entry[i];
-                    if (!boxes_touch(&ranges[e], &ranges[f])) continue;
+                    if (!lathe__ranges_meet(&ranges[e], &ranges[f])) continue;
                     lathe_range a = lathe__cells_of(&ranges[e], grid.shift);
                     /* A pair that shares several cells is tested in the first of them. */
                     if (x != imax(a.x0, b.x0) || y != imax(a.y0, b.y0)) continue;
@@ -204,6 +196,14 @@ static lathe_status find_meetings(overlay *o) {
 static bool before(const lathe_meeting *m, const lathe_meeting *n, int s) {
     return lathe__compare_fractions((uint64_t)m->numerator[s], (uint64_t)m->denominator[s], (uint64_t)n->numerator[s],
                                     (uint64_t)n->denominator[s]) < 0;
+}
+
+/* Between two meetings of one edge rounding must not close a gap either: a spike's tip may be narrow where it is crossed. */
+static void test_spacing(overlay *o, uint32_t m, uint32_t n) {
+    lathe_range r = lathe__range_of(o->at[o->vertices + m], o->at[o->vertices + n]);
+    if (r.x1 - r.x0 + r.y1 - r.y0 >= SPACING) return;
+    mark_crowded(o, o->meetings[m].edge[1]);
+    mark_crowded(o, o->meetings[n].edge[1]);
 }
 
 static lathe_status order_meetings(overlay *o) {
@@ -226,9 +226,14 @@ static lathe_status order_meetings(overlay *o) {
             for (; j > begin && before(&o->meetings[m], &o->meetings[o->on[j - 1]], s); j--) o->on[j] = o->on[j - 1];
             o->on[j] = m;
         }
-        for (uint32_t i = begin; i < end; i++) o->meetings[o->on[i]].rank[s] = i - begin;
+        for (uint32_t i = begin; i < end; i++) {
+            o->meetings[o->on[i]].rank[s] = i - begin;
+            if (o->slab->crowded && i > begin) test_spacing(o, o->on[i - 1], o->on[i]);
+        }
     }
-    return LATHE_OK;
+    if (!o->harmed) return LATHE_OK;
+    o->builder->mesh.vertex_count = o->extra;
+    return LATHE_ERR_RANGE;
 }
 
 static lathe_status add_vertex(overlay *o, int32_t x, int32_t y, int32_t z) {

@@ -7,6 +7,8 @@
 #include "level.h"
 
 enum { NONE = 0xffffffffu, CELLS_PER_PIECE = 2 };
+/* Pieces keep 1/32 voxel from each other, and angles above 1/8: so that vertices may yet move for the sake of a neighbouring slice. */
+enum { MARGIN = 2048, SPIKE = 8 };
 
 typedef struct piece {         /* an edge of the contour, from a kept vertex to the next one kept */
     uint32_t from, to;         /* vertices of the loops; to comes after from in the loop, cyclically */
@@ -81,16 +83,29 @@ static uint32_t list_pieces(refinement *r) {
     return r->piece_count = n;
 }
 
+/* Does a piece come too close to the beginning of another one, or turn back into it as a narrow spike? */
+static bool crowds(const refinement *r, const piece *p, const piece *q) {
+    const lathe_point *at = r->at;
+    if (p->to != q->from) return p->from != q->from && lathe__comes_close(at, q->from, p->from, p->to, MARGIN);
+    int64_t turn = lathe__turn(at, p->from, p->to, q->to), dot =
+        (int64_t)(at[p->from].x - at[p->to].x) * (at[q->to].x - at[p->to].x) + (int64_t)(at[p->from].y - at[p->to].y) * (at[q->to].y - at[p->to].y);
+    return (turn < 0 ? -turn : turn) * SPIKE < dot;
+}
+
 static bool pieces_meet(const refinement *r, const piece *p, const piece *q) {
+    if (crowds(r, p, q) || crowds(r, q, p)) return true;
     if (p->from == q->from || p->from == q->to || p->to == q->from || p->to == q->to) return false;
     return lathe__segments_meet(r->at, p->from, p->to, q->from, q->to);
 }
 
-/* Marks the pieces that meet another one. */
+/* Marks the pieces that meet another one, or nearly. */
 static lathe_status mark_meetings(refinement *r, bool *found) {
     lathe_range *ranges = LATHE_NEW(r->arena, lathe_range, r->piece_count);
     if (!ranges) return LATHE_ERR_MEMORY;
-    for (uint32_t i = 0; i < r->piece_count; i++) ranges[i] = lathe__range_of(r->at[r->pieces[i].from], r->at[r->pieces[i].to]);
+    for (uint32_t i = 0; i < r->piece_count; i++) {
+        lathe_range box = lathe__range_of(r->at[r->pieces[i].from], r->at[r->pieces[i].to]);
+        ranges[i] = (lathe_range){box.x0 - MARGIN, box.y0 - MARGIN, box.x1 + MARGIN, box.y1 + MARGIN};
+    }
     lathe_grid grid;
     lathe_status status = lathe__grid_build(&grid, r->arena, ranges, r->piece_count, CELLS_PER_PIECE * (uint64_t)r->piece_count);
     if (status) return status;
@@ -99,6 +114,7 @@ static lathe_status mark_meetings(refinement *r, bool *found) {
         for (uint32_t i = first[0]; i < first[1]; i++)
             for (uint32_t k = i + 1; k < first[1]; k++) {
                 piece *p = &r->pieces[grid.entry[i]], *q = &r->pieces[grid.entry[k]];
+                if (!lathe__ranges_meet(&ranges[grid.entry[i]], &ranges[grid.entry[k]])) continue;
                 if (pieces_meet(r, p, q)) p->split = q->split = *found = true;
             }
     return LATHE_OK;

@@ -1,5 +1,5 @@
-/* Refinement by edits [M 5.1] against contours and trees made anew: random regions over several doublings, single rays in any order and
- * place, the paper's figures 14 and 15, and what property 3 does and does not hold for. */
+/* Refinement by edits [M 5.1] against contours and trees made anew: random regions over several doublings, single rays
+ * in any order and place, the paper's figures 14 and 15, and what property 3 does and does not hold for. */
 #include "centre.h"
 #include "check.h"
 #include "contour_edit.h"
@@ -19,17 +19,18 @@ static bool same_crossing(const lathe_crossing *a, const lathe_crossing *b) {
 static bool same_contour(const lathe_ray_contour *a, const lathe_ray_contour *b) {
     if (a->count != b->count || a->rays != b->rays || a->turn != b->turn) return false;
     for (uint32_t i = 0; i < a->count; i++)
-        if (!same_crossing(&a->crossings[i], &b->crossings[i]) || a->types[i] != b->types[i] || a->radius[i] != b->radius[i] ||
-            a->points[i].x != b->points[i].x || a->points[i].y != b->points[i].y)
+        if (!same_crossing(&a->crossings[i], &b->crossings[i]) || a->types[i] != b->types[i] ||
+            a->radius[i] != b->radius[i] || a->points[i].x != b->points[i].x || a->points[i].y != b->points[i].y)
             return false;
     return true;
 }
 static bool same_tree(const lathe_derivation *a, const lathe_derivation *b) {
-    if (a->start != b->start || a->rays != b->rays || a->edge_count != b->edge_count || a->node_count != b->node_count) return false;
+    if (a->start != b->start || a->rays != b->rays || a->edge_count != b->edge_count || a->node_count != b->node_count)
+        return false;
     for (uint32_t i = 0; i < a->node_count; i++) {
         const lathe_derivation_node *p = &a->nodes[i], *q = &b->nodes[i];
-        if (p->symbol != q->symbol || p->edge != q->edge || p->first != q->first || p->count != q->count || p->child != q->child ||
-            p->next != q->next)
+        if (p->symbol != q->symbol || p->edge != q->edge || p->first != q->first || p->count != q->count ||
+            p->child != q->child || p->next != q->next)
             return false;
     }
     for (uint32_t i = 0; i < a->rays; i++)
@@ -37,10 +38,10 @@ static bool same_tree(const lathe_derivation *a, const lathe_derivation *b) {
     return true;
 }
 
-/* Level-1 edges of a finer contour: kept[k] says which of its crossings the k-th of the coarser one is; a new ray splits the pair (i, i + 1)
- * into two. is_new: by ray of the finer contour. */
-static void descend(uint32_t *fine, const uint32_t *coarse, const lathe_ray_contour *f, const uint32_t *kept, uint32_t coarse_count,
-                    const bool *is_new) {
+/* Level-1 edges of a finer contour: kept[k] says which of its crossings the k-th of the coarser one is; a new ray
+ * splits the pair (i, i + 1) into two. is_new: by ray of the finer contour. */
+static void descend(uint32_t *fine, const uint32_t *coarse, const lathe_ray_contour *f, const uint32_t *kept,
+                    uint32_t coarse_count, const bool *is_new) {
     for (uint32_t ray = 0, i = 0; ray < f->rays; ray++) {
         if (!is_new[ray]) {
             fine[ray] = kept[coarse[i++]];
@@ -51,11 +52,12 @@ static void descend(uint32_t *fine, const uint32_t *coarse, const lathe_ray_cont
     }
 }
 
-static bool equal_to_fresh(const lathe_edit_contour *c, lathe_edit_tree *t, const lathe_ray_contour *fresh, const uint32_t *chain,
-                           lathe_arena *arena, uint64_t *alone) {
+static bool equal_to_fresh(const lathe_edit_contour *c, lathe_edit_tree *t, const lathe_ray_contour *fresh,
+                           const uint32_t *chain, lathe_arena *arena, uint64_t *alone) {
     lathe_ray_contour edited;
     lathe_derivation edited_tree, fresh_tree, records;
-    if (!CHECK(lathe__edit_export(&edited, NULL, arena, c) == LATHE_OK) || !CHECK(same_contour(&edited, fresh))) return false;
+    if (!CHECK(lathe__edit_export(&edited, NULL, arena, c) == LATHE_OK) || !CHECK(same_contour(&edited, fresh)))
+        return false;
     if (!CHECK(lathe__edit_tree_export(&edited_tree, arena, t, c) == LATHE_OK)) return false;
     if (!CHECK(lathe__derive_chain(&fresh_tree, arena, fresh, chain) == LATHE_OK)) return false;
     if (!CHECK(same_tree(&edited_tree, &fresh_tree))) return false;
@@ -85,7 +87,8 @@ static lathe_status double_rays(lathe_edit_contour *c, lathe_edit_tree *t) {
     return LATHE_OK;
 }
 
-/* One region over all doublings. The first level-1 edges: those of the record chain, or chosen towards a round neighbour. */
+/* One region over all doublings. The first level-1 edges: those of the record chain, or chosen towards a round
+ * neighbour. */
 static bool refine_region(lathe_arena *arena, lathe_point centre, uint32_t turn, bool towards_circle) {
     lathe_edit_contour c;
     lathe_edit_tree t;
@@ -99,7 +102,8 @@ static bool refine_region(lathe_arena *arena, lathe_point centre, uint32_t turn,
         round[i] = (lathe_point){centre.x + p.x * 30, centre.y + p.y * 30};
     }
     CHECK(lathe__make_ray_contour(&circle, arena, round, 64, centre, FIRST_RAYS, 0) == LATHE_OK);
-    lathe_status status = towards_circle ? lathe__derive_pair(&d, &other, arena, &coarse, &circle) : lathe__derive_alone(&d, arena, &coarse);
+    lathe_status status = towards_circle ? lathe__derive_pair(&d, &other, arena, &coarse, &circle)
+                                         : lathe__derive_alone(&d, arena, &coarse);
     bool ok = CHECK(status == LATHE_OK);
     uint32_t *chain = LATHE_NEW(arena, uint32_t, FIRST_RAYS);
     for (uint32_t i = 0; ok && i < FIRST_RAYS; i++) chain[i] = (d.start + d.main_edge[i]) % coarse.count;
@@ -143,38 +147,74 @@ static void test_doublings(lathe_arena *arena) {
     }
     CHECK(done >= 1000);
     CHECK_EQ(compared, done * DOUBLINGS);
-    printf("%llu regions (%llu without a contour at %d rays), %llu doublings equal; all level-1 edges those of the record chain in %.1f %%\n",
+    printf("%llu regions (%llu without a contour at %d rays), %llu doublings equal; all level-1 edges those of the "
+           "record chain in %.1f %%\n",
            (unsigned long long)done, (unsigned long long)refused, FIRST_RAYS, (unsigned long long)compared,
            100.0 * (double)same_as_alone / (double)compared);
     static const char *const names[] = {"FOR", "BACK", "UP_I", "UP_O", "DOWN_I", "DOWN_O"};
-    printf("| edge | kept | as P2', P3', property 3 | with folds | simple of split |\n| --- | --- | --- | --- | --- |\n");
+    printf(
+        "| edge | kept | as P2', P3', property 3 | with folds | simple of split |\n| --- | --- | --- | --- | --- |\n");
     for (int t = 0; t <= LATHE_DOWN_O; t++) {
         uint64_t *k = total.edges[t], split = k[LATHE_SPLIT_SIMPLE] + k[LATHE_SPLIT_GENERAL];
-        printf("| %s | %llu | %llu | %llu | %.1f %% |\n", names[t], (unsigned long long)k[0], (unsigned long long)k[1], (unsigned long long)k[2],
-               split ? 100.0 * (double)k[LATHE_SPLIT_SIMPLE] / (double)split : 100.0);
+        printf("| %s | %llu | %llu | %llu | %.1f %% |\n", names[t], (unsigned long long)k[0], (unsigned long long)k[1],
+               (unsigned long long)k[2], split ? 100.0 * (double)k[LATHE_SPLIT_SIMPLE] / (double)split : 100.0);
         CHECK(k[LATHE_SPLIT_SIMPLE] > 0);
     }
     CHECK_EQ(total.edges[LATHE_FOR][LATHE_SPLIT_NONE] + total.edges[LATHE_BACK][LATHE_SPLIT_NONE], 0);
     CHECK(total.edges[LATHE_UP_I][LATHE_SPLIT_GENERAL] > 0); /* property 3 does not always hold */
 }
 
-/* Slits narrower than a lattice unit: the ends of an edge are equally far out once rounded. As long as it is one edge its type says which way it
- * leads, as an excursion its ends say so: names change, and with them the division of folds. */
+/* Slits narrower than a lattice unit: the ends of an edge are equally far out once rounded. As long as it is one edge
+ * its type says which way it leads, as an excursion its ends say so: names change, and with them the division of
+ * folds. */
 static void test_slits(lathe_arena *arena) {
     uint32_t changed = 0;
     for (int i = 0; i < 400; i++) {
         int32_t low = 20000 + i % 20 * 2900, high = 90000 + i / 20 * 1000;
         loop.count = 8;
-        memcpy(loop.points, (lathe_point[]){{100000, -low}, {70000, high}, {100001, -low}, {105000, 10}, {80000, 120000}, {-100000, 100000},
-                                            {-100000, -100000}, {1000, -100000}}, 8 * sizeof *loop.points);
+        memcpy(loop.points,
+               (lathe_point[]){{100000, -low},
+                               {70000, high},
+                               {100001, -low},
+                               {105000, 10},
+                               {80000, 120000},
+                               {-100000, 100000},
+                               {-100000, -100000},
+                               {1000, -100000}},
+               8 * sizeof *loop.points);
         lathe__arena_reset(arena);
         lathe_ray_contour c;
-        CHECK(lathe__make_ray_contour(&c, arena, loop.points, loop.count, (lathe_point){0, 0}, FIRST_RAYS, 0) == LATHE_OK);
+        CHECK(lathe__make_ray_contour(&c, arena, loop.points, loop.count, (lathe_point){0, 0}, FIRST_RAYS, 0) ==
+              LATHE_OK);
         for (uint32_t e = 0; e < c.count; e++)
             changed += c.types[e] == LATHE_UP_O && c.radius[e] == c.radius[e + 1 < c.count ? e + 1 : 0];
         CHECK(refine_region(arena, (lathe_point){0, 0}, 0, i & 1));
     }
     CHECK(changed >= 20);
+}
+
+/* The tip of a spike on a new ray, which its flanks just miss: both crossings lie in one vertex. Outwards, and a
+ * notch. */
+static void test_spikes(lathe_arena *arena) {
+    static const lathe_point spike[] = {{12, -1}, {13, 6}, {10, 10}, {8, 5}, {3, 12}, {-10, -1}, {-1, -10}};
+    static const lathe_point notch[] = {{12, -1}, {8, 5}, {10, 10}, {13, 6}, {20, 21}, {3, 12}, {-10, -1}, {-1, -10}};
+    for (int i = 0; i < 2; i++) {
+        lathe_ray_contour c;
+        loop.count = i ? 8 : 7;
+        for (uint32_t k = 0; k < loop.count; k++) {
+            lathe_point p = i ? notch[k] : spike[k];
+            loop.points[k] = (lathe_point){p.x * 65536, p.y * 65536};
+        }
+        lathe__arena_reset(arena);
+        CHECK(lathe__make_ray_contour(&c, arena, loop.points, loop.count, (lathe_point){0, 0}, 8, 0) == LATHE_OK);
+        uint32_t same = 0;
+        for (uint32_t e = 0; e < c.count; e++) {
+            uint32_t n = e + 1 < c.count ? e + 1 : 0;
+            same += c.points[e].x == c.points[n].x && c.points[e].y == c.points[n].y;
+        }
+        CHECK_EQ(same, 1);
+        CHECK(refine_region(arena, (lathe_point){0, 0}, 0, i));
+    }
 }
 
 /* ---- single rays, anywhere, in any order: against a cast at FINE rays of which the others are left out ---- */
@@ -211,7 +251,8 @@ static bool thin_out(lathe_ray_contour *out, lathe_arena *arena, const lathe_ray
     }
     for (uint32_t i = 0; i < out->count; i++) {
         uint32_t n = i + 1 < out->count ? i + 1 : 0;
-        out->crossings[i].outward = fine_ray[i] == fine_ray[n] && outward(all->centre, &out->crossings[i], &out->crossings[n], fine_ray[i]);
+        out->crossings[i].outward =
+            fine_ray[i] == fine_ray[n] && outward(all->centre, &out->crossings[i], &out->crossings[n], fine_ray[i]);
     }
     return lathe__classify_edges(out->types, out->crossings, out->count, rays) == LATHE_OK;
 }
@@ -228,7 +269,8 @@ static bool refine_anywhere(lathe_arena *arena, uint64_t *seed) {
     uint32_t number[FINE] = {0}, chain[FINE], next_chain[FINE];
     for (uint32_t i = 0; i < FIRST_RAYS; i++) keep[i * (FINE / FIRST_RAYS)] = true, number[i * (FINE / FIRST_RAYS)] = i;
     ok = CHECK(lathe__make_ray_contour(&all, arena, loop.points, loop.count, centre, FINE, 0) == LATHE_OK);
-    ok = ok && CHECK(thin_out(&coarse, arena, &all, keep)) && CHECK(lathe__derive_alone(&d, arena, &coarse) == LATHE_OK);
+    ok =
+        ok && CHECK(thin_out(&coarse, arena, &all, keep)) && CHECK(lathe__derive_alone(&d, arena, &coarse) == LATHE_OK);
     for (uint32_t i = 0; ok && i < FIRST_RAYS; i++) chain[i] = (d.start + d.main_edge[i]) % coarse.count;
     bool has_tree = ok && CHECK(lathe__edit_tree_open(&t, &c, chain) == LATHE_OK);
     for (int k = 0; has_tree && ok && k < ODD_RAYS; k++) {
@@ -287,7 +329,8 @@ static void types_after(char *text, size_t size) {
     if (CHECK(lathe__edit_contour_open(&c, loop.points, loop.count, (lathe_point){0, 0}, 4, 0) == LATHE_OK)) {
         CHECK(lathe__edit_insert_ray(&c, 0, 8192) == LATHE_OK);
         CHECK(lathe__edit_export(&r, NULL, &arena, &c) == LATHE_OK);
-        for (uint32_t i = 0; i < r.count; i++) used += (size_t)snprintf(text + used, size - used, "%s", letters[r.types[i]]);
+        for (uint32_t i = 0; i < r.count; i++)
+            used += (size_t)snprintf(text + used, size - used, "%s", letters[r.types[i]]);
         lathe__edit_contour_close(&c);
     }
     lathe__arena_free(&arena);
@@ -302,8 +345,12 @@ static void test_figures(void) {
     take((lathe_point[]){{10, -1}, {20, 17}, {17, 20}, {8, 6}, {6, 8}, {10, 16}, {-1, 10}, {-10, -1}, {1, -10}}, 9);
     types_after(text, sizeof text);
     CHECK(!strcmp(text, "fdi do ffff") || !strcmp(text, "fdi uo ffff") || !strcmp(text, "fdi ui ffff"));
-    /* 15 (c): UP_O into FOR, UP_O, BACK. The walk leaves ray 0, turns round beyond the new ray and comes back further out. */
-    take((lathe_point[]){{5, -1}, {5, 1}, {3, 6}, {6, 9}, {20, 1}, {20, -1}, {30, -1}, {30, 5}, {1, 40}, {-10, -1}, {1, -10}}, 11);
+    /* 15 (c): UP_O into FOR, UP_O, BACK. The walk leaves ray 0, turns round beyond the new ray and comes back further
+     * out. */
+    take(
+        (lathe_point[]){
+            {5, -1}, {5, 1}, {3, 6}, {6, 9}, {20, 1}, {20, -1}, {30, -1}, {30, 5}, {1, 40}, {-10, -1}, {1, -10}},
+        11);
     types_after(text, sizeof text);
     CHECK(!strcmp(text, "fuo bui fffff") || !strcmp(text, "fuo bui ffff"));
 }
@@ -335,6 +382,7 @@ int main(void) {
     test_errors();
     test_doublings(&arena);
     test_slits(&arena);
+    test_spikes(&arena);
     test_anywhere(&arena);
     lathe__arena_free(&arena);
     return check_end();

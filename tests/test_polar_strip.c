@@ -20,7 +20,9 @@ static uint32_t make_stack(lathe_arena *arena, uint64_t *seed, uint32_t want, ui
         shape_trace(&loops[k], &region, seed, 1);
         if (lathe__loop_centre(&centre, arena, loops[k].points, loops[k].count)) continue;
         heights[count] = (int32_t)k * VOXEL;
-        if (!lathe__make_ray_contour(&contours[count], arena, loops[k].points, loops[k].count, centre, rays, (uint32_t)shape_below(seed, 65536))) count++;
+        if (!lathe__make_ray_contour(&contours[count], arena, loops[k].points, loops[k].count, centre, rays,
+                                     (uint32_t)shape_below(seed, 65536)))
+            count++;
     }
     return count;
 }
@@ -29,12 +31,16 @@ static bool same_stack(const lathe_polar_stack *a, const lathe_polar_stack *b) {
     for (uint32_t k = 0; k < a->count; k++) {
         const lathe_polar_contour *p = &a->contours[k], *q = &b->contours[k];
         const lathe_ray_contour *c = &p->contour, *d = &q->contour;
-        if (p->height != q->height || c->centre.x != d->centre.x || c->centre.y != d->centre.y || c->turn != d->turn || c->count != d->count) return false;
+        if (p->height != q->height || c->centre.x != d->centre.x || c->centre.y != d->centre.y || c->turn != d->turn ||
+            c->count != d->count)
+            return false;
         if (memcmp(p->steps, q->steps, c->count * sizeof *p->steps) || memcmp(c->types, d->types, c->count) ||
-            memcmp(c->points, d->points, c->count * sizeof *c->points) || memcmp(c->radius, d->radius, c->count * sizeof *c->radius))
+            memcmp(c->points, d->points, c->count * sizeof *c->points) ||
+            memcmp(c->radius, d->radius, c->count * sizeof *c->radius))
             return false;
         for (uint32_t i = 0; i < c->count; i++)
-            if (c->crossings[i].ray != d->crossings[i].ray || c->crossings[i].in_out != d->crossings[i].in_out) return false;
+            if (c->crossings[i].ray != d->crossings[i].ray || c->crossings[i].in_out != d->crossings[i].in_out)
+                return false;
     }
     return true;
 }
@@ -48,9 +54,11 @@ static bool near_given(const lathe_polar_stack *s) {
         if (c->count != given->count) return false;
         for (uint32_t i = 0; i < c->count; i++) {
             uint32_t g = (start + i) % c->count;
-            double off = hypot((double)c->points[i].x - given->points[g].x, (double)c->points[i].y - given->points[g].y);
+            double off =
+                hypot((double)c->points[i].x - given->points[g].x, (double)c->points[i].y - given->points[g].y);
             /* Directions are rounded to 2^-14, turns to as much again. */
-            if (c->crossings[i].ray != given->crossings[g].ray || off > step + 3 + (double)given->radius[g] / 8192) return false;
+            if (c->crossings[i].ray != given->crossings[g].ray || off > step + 3 + (double)given->radius[g] / 8192)
+                return false;
             if (llabs(c->radius[i] - given->radius[g]) > step + 2) return false;
         }
     }
@@ -62,7 +70,9 @@ static void test_round_trips(lathe_arena *arena) {
     uint32_t done = 0;
     for (int round = 0; round < 600; round++) {
         lathe__arena_reset(arena);
-        uint32_t bits = round & 1 ? 16 : 32, count = make_stack(arena, &seed, 2 + (uint32_t)shape_below(&seed, MOST - 1), 4u << shape_below(&seed, 6));
+        uint32_t bits = round & 1 ? 16 : 32,
+                 count =
+                     make_stack(arena, &seed, 2 + (uint32_t)shape_below(&seed, MOST - 1), 4u << shape_below(&seed, 6));
         lathe_polar_stack stack, back;
         if (!count) continue;
         lathe_status status = lathe__polar_quantise(&stack, arena, contours, heights, count, bits);
@@ -80,7 +90,8 @@ static void test_round_trips(lathe_arena *arena) {
         lathe_mesh_report report;
         if (CHECK(lathe__polar_mesh(&mesh, &back) == LATHE_OK) && count > 1) {
             CHECK(lathe__mesh_check(&report, &mesh, false) == LATHE_OK);
-            CHECK_EQ(report.nonmanifold_edges + report.misoriented_edges + report.bad_indices + report.unused_vertices, 0);
+            CHECK_EQ(report.nonmanifold_edges + report.misoriented_edges + report.bad_indices + report.unused_vertices,
+                     0);
             CHECK_EQ(report.boundary_edges, stack.contours[0].contour.count + stack.contours[count - 1].contour.count);
             CHECK_EQ(mesh.triangle_count, 2 * vertices - report.boundary_edges);
         }
@@ -94,8 +105,8 @@ static void test_round_trips(lathe_arena *arena) {
 
 /* Written by hand: a square at four rays, centre (1, 2), in 16 bits. */
 static void test_bytes(lathe_arena *arena) {
-    static const uint8_t bytes[] = {'L', 'P', 'S', '1', 16, 2, 0, 0, 1, 0, 0, 0, 0x55, 0x55, 0, 0, 0, 0, 0, 0,
-                                    1, 0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 0, 0, 0, 0, 4, 0, 0, 0,
+    static const uint8_t bytes[] = {'L', 'P', 'S', '1', 16, 2, 0, 0, 1, 0, 0, 0, 0x55, 0x55, 0, 0, 0, 0, 0, 0, 1, 0, 0,
+                                    0, 2, 0, 0, 0, 3, 0, 0, 0, 0, 0, 0, 0, 4, 0, 0, 0,
                                     /* 2 * 21845 + 10, 20, 30, 40 */
                                     0xb4, 0xaa, 0xbe, 0xaa, 0xc8, 0xaa, 0xd2, 0xaa};
     lathe_polar_stack s;
@@ -103,8 +114,10 @@ static void test_bytes(lathe_arena *arena) {
     if (!CHECK(lathe__polar_decode(&s, arena, bytes, sizeof bytes) == LATHE_OK)) return;
     CHECK(s.count == 1 && s.rays == 4 && s.farthest == 21845 && s.contours[0].height == 3);
     const lathe_ray_contour *c = &s.contours[0].contour;
-    for (uint32_t i = 0; i < 4; i++) CHECK(c->types[i] == LATHE_FOR && c->crossings[i].ray == i && s.contours[0].steps[i] == 10 * (i + 1));
-    CHECK(c->points[1].x == 1 && c->points[1].y == 23 && c->points[2].x == -30);   /* 20.5 and 30.5, rounded away from the centre or to it */
+    for (uint32_t i = 0; i < 4; i++)
+        CHECK(c->types[i] == LATHE_FOR && c->crossings[i].ray == i && s.contours[0].steps[i] == 10 * (i + 1));
+    CHECK(c->points[1].x == 1 && c->points[1].y == 23 &&
+          c->points[2].x == -30); /* 20.5 and 30.5, rounded away from the centre or to it */
     CHECK_EQ(lathe__polar_size(&s), sizeof bytes);
     lathe__polar_encode(again, &s);
     CHECK(!memcmp(bytes, again, sizeof bytes));
@@ -125,7 +138,7 @@ static void test_damage(lathe_arena *arena) {
         uint8_t *bytes = LATHE_NEW(&own, uint8_t, size), *copy = malloc(size);
         lathe__polar_encode(bytes, &stack);
         for (size_t n = 0; n < size; n++) {
-            uint8_t *prefix = malloc(n ? n : 1);   /* exactly as long, so that reading on is found out */
+            uint8_t *prefix = malloc(n ? n : 1); /* exactly as long, so that reading on is found out */
             memcpy(prefix, bytes, n);
             lathe__arena_reset(arena);
             CHECK(lathe__polar_decode(&back, arena, prefix, n) == LATHE_ERR_FORMAT);
@@ -133,7 +146,8 @@ static void test_damage(lathe_arena *arena) {
         }
         for (int k = 0; k < 3000; k++) {
             memcpy(copy, bytes, size);
-            for (int flips = 1 + shape_below(&seed, 3); flips > 0; flips--) copy[shape_below(&seed, (int)size)] ^= (uint8_t)(1 << shape_below(&seed, 8));
+            for (int flips = 1 + shape_below(&seed, 3); flips > 0; flips--)
+                copy[shape_below(&seed, (int)size)] ^= (uint8_t)(1 << shape_below(&seed, 8));
             lathe__arena_reset(arena);
             if (lathe__polar_decode(&back, arena, copy, size)) continue;
             /* What is taken is a stack like any other. */

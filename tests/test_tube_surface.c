@@ -1,5 +1,5 @@
-/* Tubes and their refinement as edits [M 5.2, appendix C]: after every ray and every slice the mesh equals one made anew, vertices keep their
- * numbers, and what changes is only what the new ray or slice meets. */
+/* Tubes and their refinement as edits [M 5.2, appendix C]: after every ray and every slice the mesh equals one made
+ * anew, vertices keep their numbers, and what changes is only what the new ray or slice meets. */
 #include "centre.h"
 #include "check.h"
 #include "mesh.h"
@@ -15,7 +15,9 @@ static lathe_tube_loop inputs[MOST_SLICES];
 
 /* ---- triangles as sets ---- */
 
-typedef struct triangles { uint32_t (*at)[3], count; } triangles;
+typedef struct triangles {
+    uint32_t (*at)[3], count;
+} triangles;
 static int compare_triangles(const void *a, const void *b) {
     const uint32_t *p = a, *q = b;
     for (int k = 0; k < 3; k++)
@@ -50,11 +52,12 @@ static uint32_t common(const triangles *a, const triangles *b) {
 /* A contour at each number of rays, and per strip the level-1 edges of either side. */
 typedef struct fresh_slice {
     lathe_ray_contour level[MOST_LEVELS];
-    uint32_t *vertex;          /* by index in the last level: the edited mesh's vertex */
+    uint32_t *vertex; /* by index in the last level: the edited mesh's vertex */
 } fresh_slice;
 static fresh_slice fresh[MOST_SLICES];
 
-static void descend(uint32_t *fine, const uint32_t *coarse, const lathe_ray_contour *f, const lathe_ray_contour *c, lathe_arena *arena) {
+static void descend(uint32_t *fine, const uint32_t *coarse, const lathe_ray_contour *f, const lathe_ray_contour *c,
+                    lathe_arena *arena) {
     uint32_t *kept = LATHE_NEW(arena, uint32_t, f->count), found = 0;
     for (uint32_t i = 0; i < f->count; i++)
         if (f->crossings[i].ray % 2 == 0) kept[found++] = i;
@@ -71,12 +74,14 @@ static void add(triangles *t, uint32_t a, uint32_t b, uint32_t c) {
 }
 static double gap(lathe_point p, lathe_point q) { return hypot((double)p.x - q.x, (double)p.y - q.y); }
 
-static void add_tiling(triangles *t, const lathe_tiling *tiling, const fresh_slice *lower, const fresh_slice *upper, int level) {
+static void add_tiling(triangles *t, const lathe_tiling *tiling, const fresh_slice *lower, const fresh_slice *upper,
+                       int level) {
     const lathe_ray_contour *a = &lower->level[level], *b = &upper->level[level];
     uint32_t i = tiling->start[0], j = tiling->start[1];
     for (uint32_t k = 0; k < tiling->count; k++) {
         uint8_t step = tiling->steps[k];
-        uint32_t ni = (i + 1) % a->count, nj = (j + 1) % b->count, p = lower->vertex[i], np = lower->vertex[ni], q = upper->vertex[j], nq = upper->vertex[nj];
+        uint32_t ni = (i + 1) % a->count, nj = (j + 1) % b->count, p = lower->vertex[i], np = lower->vertex[ni],
+                 q = upper->vertex[j], nq = upper->vertex[nj];
         if (step == 1) add(t, p, np, q);
         if (step == 2) add(t, p, nq, q);
         if (step == 3 && gap(a->points[i], b->points[nj]) < gap(a->points[ni], b->points[j]))
@@ -87,7 +92,8 @@ static void add_tiling(triangles *t, const lathe_tiling *tiling, const fresh_sli
         if (step & 2) j = nj;
     }
 }
-static void add_strip(triangles *t, const fresh_slice *lower, const fresh_slice *upper, int levels, lathe_arena *arena) {
+static void add_strip(triangles *t, const fresh_slice *lower, const fresh_slice *upper, int levels,
+                      lathe_arena *arena) {
     lathe_derivation d[2];
     lathe_tiling tiling;
     const fresh_slice *s[2] = {lower, upper};
@@ -104,22 +110,26 @@ static void add_strip(triangles *t, const fresh_slice *lower, const fresh_slice 
         }
         CHECK(lathe__derive_chain(&d[k], arena, &s[k]->level[levels - 1], chain[k]) == LATHE_OK);
     }
-    CHECK(lathe__walk_derivations(&tiling, NULL, arena, &lower->level[levels - 1], &d[0], &upper->level[levels - 1], &d[1]) == LATHE_OK);
+    CHECK(lathe__walk_derivations(&tiling, NULL, arena, &lower->level[levels - 1], &d[0], &upper->level[levels - 1],
+                                  &d[1]) == LATHE_OK);
     add_tiling(t, &tiling, lower, upper, levels - 1);
 }
-/* Of inputs[0 .. count) at first_rays << (levels - 1) rays, in the vertices of the edited tube. chosen_anew: strips by lathe__tile_trees, whose
- * level-1 edges are chosen at the last rays. */
-static triangles make_anew(const lathe_tube_surface *tube, uint32_t count, uint32_t first_rays, int levels, bool chosen_anew, lathe_arena *arena) {
+/* Of inputs[0 .. count) at first_rays << (levels - 1) rays, in the vertices of the edited tube. chosen_anew: strips by
+ * lathe__tile_trees, whose level-1 edges are chosen at the last rays. */
+static triangles make_anew(const lathe_tube_surface *tube, uint32_t count, uint32_t first_rays, int levels,
+                           bool chosen_anew, lathe_arena *arena) {
     triangles t = {0};
     uint32_t edges = 0;
     for (uint32_t k = 0; k < count; k++) {
         const lathe_tube_loop *in = &inputs[k];
         for (int l = 0; l < levels; l++)
-            CHECK(lathe__make_ray_contour(&fresh[k].level[l], arena, in->points, in->count, in->centre, first_rays << l, in->turn) == LATHE_OK);
+            CHECK(lathe__make_ray_contour(&fresh[k].level[l], arena, in->points, in->count, in->centre, first_rays << l,
+                                          in->turn) == LATHE_OK);
         lathe_ray_contour edited;
         CHECK(lathe__edit_export(&edited, &fresh[k].vertex, arena, lathe__tube_contour(tube, k)) == LATHE_OK);
         if (!CHECK_EQ(edited.count, fresh[k].level[levels - 1].count)) return t;
-        for (uint32_t i = 0; i < edited.count; i++) fresh[k].vertex[i] = lathe__tube_vertex(tube, k, fresh[k].vertex[i]);
+        for (uint32_t i = 0; i < edited.count; i++)
+            fresh[k].vertex[i] = lathe__tube_vertex(tube, k, fresh[k].vertex[i]);
         edges += edited.count;
     }
     t.at = lathe__arena_alloc(arena, 2 * (size_t)edges + 2, sizeof *t.at);
@@ -127,11 +137,13 @@ static triangles make_anew(const lathe_tube_surface *tube, uint32_t count, uint3
         lathe_tiling tiling;
         if (!chosen_anew)
             add_strip(&t, &fresh[k], &fresh[k + 1], levels, arena);
-        else if (CHECK(lathe__tile_trees(&tiling, arena, &fresh[k].level[levels - 1], &fresh[k + 1].level[levels - 1]) == LATHE_OK))
+        else if (CHECK(lathe__tile_trees(&tiling, arena, &fresh[k].level[levels - 1],
+                                         &fresh[k + 1].level[levels - 1]) == LATHE_OK))
             add_tiling(&t, &tiling, &fresh[k], &fresh[k + 1], levels - 1);
     }
     for (int end = 0; end < 2; end++) {
-        uint32_t k = end ? count - 1 : 0, n = fresh[k].level[levels - 1].count, apex = lathe__tube_vertex(tube, k, UINT32_MAX);
+        uint32_t k = end ? count - 1 : 0, n = fresh[k].level[levels - 1].count,
+                 apex = lathe__tube_vertex(tube, k, UINT32_MAX);
         for (uint32_t i = 0; i < n; i++) {
             uint32_t p = fresh[k].vertex[i], q = fresh[k].vertex[(i + 1) % n];
             add(&t, apex, end ? p : q, end ? q : p);
@@ -146,7 +158,9 @@ static triangles triangles_of(const lathe_tube_surface *tube, lathe_arena *arena
     triangles t = {0};
     if (!CHECK(lathe__tube_mesh(&mesh, tube) == LATHE_OK)) return t;
     CHECK(lathe__mesh_check(&report, &mesh, star) == LATHE_OK);
-    CHECK_EQ(report.boundary_edges + report.nonmanifold_edges + report.misoriented_edges + report.nonmanifold_vertices + report.bad_indices, 0);
+    CHECK_EQ(report.boundary_edges + report.nonmanifold_edges + report.misoriented_edges + report.nonmanifold_vertices +
+                 report.bad_indices,
+             0);
     CHECK_EQ(report.unused_vertices, 0);
     CHECK_EQ(report.euler, 2);
     if (star) CHECK_EQ(report.degenerate_triangles + report.duplicate_positions + report.self_intersections, 0);
@@ -165,7 +179,8 @@ static lathe_tube_loop star_loop(uint32_t store, double phase, double bumps, int
     shape_loop *l = &loops[store];
     l->count = 180;
     for (uint32_t i = 0; i < l->count; i++) {
-        double a = 6.283185307179586 * i / l->count + 0.003, r = (10 + bumps * cos(5 * a + phase) + 1.5 * sin(2 * a - 2 * phase)) * VOXEL;
+        double a = 6.283185307179586 * i / l->count + 0.003,
+               r = (10 + bumps * cos(5 * a + phase) + 1.5 * sin(2 * a - 2 * phase)) * VOXEL;
         l->points[i] = (lathe_point){(int32_t)lround(r * cos(a)), (int32_t)lround(r * sin(a))};
     }
     return (lathe_tube_loop){l->points, l->count, {0, 0}, height, 0};
@@ -175,13 +190,15 @@ static bool pixel_loop(uint32_t k, uint64_t *seed, int kind, int32_t height, lat
     shape_make(&region, seed, kind);
     shape_trace(&loops[k], &region, seed, 1);
     if (lathe__loop_centre(&centre, arena, loops[k].points, loops[k].count)) return false;
-    inputs[k] = (lathe_tube_loop){loops[k].points, loops[k].count, centre, height, (uint32_t)shape_below(seed, 3) * 777};
+    inputs[k] =
+        (lathe_tube_loop){loops[k].points, loops[k].count, centre, height, (uint32_t)shape_below(seed, 3) * 777};
     return true;
 }
 
 /* ---- tests ---- */
 
-static void check_equal_to_fresh(const lathe_tube_surface *tube, uint32_t count, uint32_t rays, int levels, bool star, lathe_arena *arena) {
+static void check_equal_to_fresh(const lathe_tube_surface *tube, uint32_t count, uint32_t rays, int levels, bool star,
+                                 lathe_arena *arena) {
     triangles edited = triangles_of(tube, arena, star), anew = make_anew(tube, count, rays, levels, false, arena);
     CHECK(same_triangles(&edited, &anew));
     if (!star) return;
@@ -197,7 +214,8 @@ static void test_star(lathe_arena *arena) {
     if (!CHECK(lathe__tube_open(&tube, inputs, 5, 8) == LATHE_OK)) return;
     CHECK_EQ(lathe__tube_triangles(tube), 4 * 16 + 2 * 8);
     check_equal_to_fresh(tube, 5, 8, 1, true, arena);
-    printf("| step | triangles after | kept | removed | added | rebuilt would be |\n| --- | --- | --- | --- | --- | --- |\n");
+    printf("| step | triangles after | kept | removed | added | rebuilt would be |\n| --- | --- | --- | --- | --- | "
+           "--- |\n");
     uint32_t count = 5;
     for (int level = 1; level < 3; level++) {
         lathe_mesh before, after;
@@ -222,12 +240,14 @@ static void test_star(lathe_arena *arena) {
         }
         w1 = lathe__tube_work_done(tube);
         printf("| %u slices | %u | %u | %llu | %llu | %u |\n", count, lathe__tube_triangles(tube),
-               (uint32_t)(lathe__tube_triangles(tube) - (w1.added - w0.added)), (unsigned long long)(w1.removed - w0.removed),
-               (unsigned long long)(w1.added - w0.added), lathe__tube_triangles(tube));
+               (uint32_t)(lathe__tube_triangles(tube) - (w1.added - w0.added)),
+               (unsigned long long)(w1.removed - w0.removed), (unsigned long long)(w1.added - w0.added),
+               lathe__tube_triangles(tube));
         CHECK_EQ(lathe__tube_slices(tube), count);
         for (uint32_t k = 0; k < count; k++) {
             const lathe_edit_contour *c = lathe__tube_contour(tube, k);
-            inputs[k] = (lathe_tube_loop){c->loop, c->point_count, c->centre, (int32_t)k * 32 / (int32_t)(count - 1) * VOXEL, 0};
+            inputs[k] = (lathe_tube_loop){c->loop, c->point_count, c->centre,
+                                          (int32_t)k * 32 / (int32_t)(count - 1) * VOXEL, 0};
         }
         check_equal_to_fresh(tube, count, 8, level + 1, true, arena);
         CHECK(lathe__tube_mesh(&after, tube) == LATHE_OK);
@@ -245,8 +265,9 @@ static void test_star(lathe_arena *arena) {
     CHECK_EQ(w1.removed - w0.removed, 2 * (LAST - 1) + 2);
     CHECK_EQ(w1.added - w0.added, 4 * (LAST - 1) + 4);
     printf("| one ray more | %u | %u | %llu | %llu | %u |\n", lathe__tube_triangles(tube),
-           (uint32_t)(lathe__tube_triangles(tube) - (w1.added - w0.added)), (unsigned long long)(w1.removed - w0.removed),
-           (unsigned long long)(w1.added - w0.added), lathe__tube_triangles(tube));
+           (uint32_t)(lathe__tube_triangles(tube) - (w1.added - w0.added)),
+           (unsigned long long)(w1.removed - w0.removed), (unsigned long long)(w1.added - w0.added),
+           lathe__tube_triangles(tube));
     triangles_of(tube, arena, true);
     lathe__tube_close(&tube);
 }
@@ -259,7 +280,8 @@ static void test_folds(lathe_arena *arena) {
         lathe_tube_surface *tube = NULL;
         lathe__arena_reset(arena);
         uint32_t count = 2 + (uint32_t)shape_below(&seed, 3), made = 0;
-        for (uint32_t k = 0; k < count + 1; k++) made += pixel_loop(k, &seed, shape_below(&seed, 4), (int32_t)k * VOXEL, arena);
+        for (uint32_t k = 0; k < count + 1; k++)
+            made += pixel_loop(k, &seed, shape_below(&seed, 4), (int32_t)k * VOXEL, arena);
         if (made != count + 1) continue;
         lathe_tube_loop all[8], late = inputs[1];
         memcpy(all, inputs, (count + 1) * sizeof *all);
@@ -286,7 +308,8 @@ static void test_folds(lathe_arena *arena) {
 
 /* Appendix C: to four rays, r4 to r7 are added one after another. */
 static void test_appendix_c(lathe_arena *arena) {
-    static const lathe_point upper[] = {{9, -1}, {9, 3}, {4, 4}, {3, 9}, {-1, 9}, {-6, 7}, {-4, 4}, {-8, 6}, {-9, -1}, {-5, -5}, {-1, -9}, {6, -7}};
+    static const lathe_point upper[] = {{9, -1}, {9, 3},  {4, 4},   {3, 9},   {-1, 9},  {-6, 7},
+                                        {-4, 4}, {-8, 6}, {-9, -1}, {-5, -5}, {-1, -9}, {6, -7}};
     static const lathe_point lower[] = {{8, -1}, {7, 7}, {-1, 8}, {-7, 7}, {-8, -1}, {-7, -7}, {-1, -8}, {7, -7}};
     for (uint32_t k = 0; k < 2; k++) {
         loops[k].count = k ? 12 : 8;

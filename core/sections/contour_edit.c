@@ -1,8 +1,9 @@
 /* Casting one ray more at a contour (see contour_edit.h).
  *
- * Between two neighbouring crossings all points of the loop lie in one sector, from ray i (counted to it) to ray i + 1, less than half a turn
- * wide: on which side of the new ray a point lies is the sign of one cross product. The edges in that sector are those that leave the IN-OUT
- * crossings of ray i (f, o) and the OUT-IN crossings of ray i + 1 (b, i). */
+ * Between two neighbouring crossings all points of the loop lie in one sector, from ray i (counted to it) to ray i +
+ * 1, less than half a turn wide: on which side of the new ray a point lies is the sign of one cross product. The edges
+ * in that sector are those that leave the IN-OUT crossings of ray i (f, o) and the OUT-IN crossings of ray i + 1 (b,
+ * i). */
 #include "contour_edit.h"
 #include <stdlib.h>
 #include <string.h>
@@ -10,7 +11,9 @@
 #define NONE UINT32_MAX
 static const uint32_t MOST = UINT32_MAX / 8;
 
-typedef struct vector { int64_t x, y; } vector;
+typedef struct vector {
+    int64_t x, y;
+} vector;
 static int64_t cross(vector a, vector b) { return a.x * b.y - a.y * b.x; }
 static uint64_t magnitude(int64_t v) { return v < 0 ? -(uint64_t)v : (uint64_t)v; }
 static vector from_centre(const lathe_edit_contour *c, uint32_t point) {
@@ -23,7 +26,7 @@ static vector direction_at(uint32_t angle) {
 }
 
 static bool grow(void **array, uint32_t *capacity, uint32_t want, size_t size) {
-    if (want <= *capacity) return true;
+    if (want <= *capacity && *array) return true;
     uint32_t more = *capacity + *capacity / 2 + 64;
     if (more < want) more = want;
     void *p = realloc(*array, more * size);
@@ -102,14 +105,16 @@ static uint32_t segment_of(const lathe_edit_contour *c, const lathe_crossing *x)
     if (x->numerator || !x->in_out) return x->segment;
     return x->segment ? x->segment - 1 : c->point_count - 1;
 }
-static lathe_status take_crossings(lathe_edit_contour *c, const lathe_crossing *found, uint32_t count) {
+static lathe_status take_crossings(lathe_edit_contour *c, const lathe_crossing *found, uint32_t count, uint32_t step) {
     if (!grow_crossings(c, count)) return LATHE_ERR_MEMORY;
-    uint32_t step = 65536 / c->ray_count;
     for (uint32_t i = 0; i < count; i++) {
         if (through_centre(c, &found[i])) return LATHE_ERR_FORMAT;
         lathe_edit_crossing *x = &c->crossings[i];
-        *x = (lathe_edit_crossing){.at = found[i], .next = i + 1 < count ? i + 1 : 0, .beside = c->rays[found[i].ray].first,
-                                   .cast_segment = segment_of(c, &found[i]), .split_by = NONE};
+        *x = (lathe_edit_crossing){.at = found[i],
+                                   .next = i + 1 < count ? i + 1 : 0,
+                                   .beside = c->rays[found[i].ray].first,
+                                   .cast_segment = segment_of(c, &found[i]),
+                                   .split_by = NONE};
         c->rays[x->at.ray].first = i;
         if (!place(c, x, direction_at(x->at.ray * step))) return LATHE_ERR_FORMAT;
     }
@@ -135,11 +140,11 @@ static lathe_status open_contour(lathe_edit_contour *c, lathe_arena *scratch, ui
     c->ray_count = rays;
     for (uint32_t i = 0; i < rays; i++)
         c->rays[i] = (lathe_edit_ray){i * (65536 / rays), NONE, i + 1 < rays ? i + 1 : 0, i ? i - 1 : rays - 1};
-    return take_crossings(c, found, count);
+    return take_crossings(c, found, count, 65536 / rays);
 }
-lathe_status lathe__edit_contour_open(lathe_edit_contour *out, const lathe_point *loop, uint32_t count, lathe_point centre, uint32_t rays,
-                                      uint32_t turn) {
-    if (count < 3 || count > MOST) return LATHE_ERR_RANGE;
+lathe_status lathe__edit_contour_open(lathe_edit_contour *out, const lathe_point *loop, uint32_t count,
+                                      lathe_point centre, uint32_t rays, uint32_t turn) {
+    if (count < 3 || count > MOST || rays < 4) return LATHE_ERR_RANGE;
     lathe_edit_contour c = {.loop = loop, .point_count = count, .turn = turn & 65535, .centre = centre};
     lathe_arena scratch = {0};
     lathe_status status = open_contour(&c, &scratch, rays);
@@ -164,20 +169,25 @@ typedef struct insertion {
     lathe_edit_contour *contour;
     uint32_t ray;
     vector direction;
-    uint32_t last, next;       /* of the edge in hand: the crossing that a new one follows, the one that it led to */
-    bool wraps;                /* the edge in hand leads past the loop's first point */
+    uint32_t last, next; /* of the edge in hand: the crossing that a new one follows, the one that it led to */
+    bool wraps;          /* the edge in hand leads past the loop's first point */
     lathe_status status;
 } insertion;
 
 static void add_crossing(insertion *in, uint32_t segment, bool in_out) {
     lathe_edit_contour *c = in->contour;
-    if (c->count >= MOST) in->status = LATHE_ERR_LIMIT;
-    else if (!grow_crossings(c, c->count + 1)) in->status = LATHE_ERR_MEMORY;
+    if (c->count >= MOST)
+        in->status = LATHE_ERR_LIMIT;
+    else if (!grow_crossings(c, c->count + 1))
+        in->status = LATHE_ERR_MEMORY;
     if (in->status) return;
     bool behind = segment >= c->point_count;
     lathe_edit_crossing *x = &c->crossings[c->count];
-    *x = (lathe_edit_crossing){.at = {.ray = in->ray, .in_out = in_out}, .next = in->next, .beside = c->rays[in->ray].first,
-                               .cast_segment = behind ? segment - c->point_count : segment, .split_by = NONE};
+    *x = (lathe_edit_crossing){.at = {.ray = in->ray, .in_out = in_out},
+                               .next = in->next,
+                               .beside = c->rays[in->ray].first,
+                               .cast_segment = behind ? segment - c->point_count : segment,
+                               .split_by = NONE};
     if (!place(c, x, in->direction)) {
         in->status = LATHE_ERR_FORMAT;
         return;
@@ -252,7 +262,8 @@ lathe_status lathe__edit_insert_ray(lathe_edit_contour *contour, uint32_t after,
 
 /* ---- export ---- */
 
-lathe_status lathe__edit_export(lathe_ray_contour *out, uint32_t **ids, lathe_arena *arena, const lathe_edit_contour *contour) {
+lathe_status lathe__edit_export(lathe_ray_contour *out, uint32_t **ids, lathe_arena *arena,
+                                const lathe_edit_contour *contour) {
     const lathe_edit_contour *c = contour;
     lathe_ray_contour r = {.centre = c->centre, .rays = c->ray_count, .turn = c->turn, .count = c->count};
     uint32_t *rank = LATHE_NEW(arena, uint32_t, c->ray_count), *order = LATHE_NEW(arena, uint32_t, c->count);

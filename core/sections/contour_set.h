@@ -51,9 +51,9 @@ void lathe__contour_set_free(lathe_contour_set *set);
 
 /* Fewer points: every section's outline replaced by one whose edges are within tolerance mm of it, by the hierarchy that
  * never intersects [H]. Loops stay simple and nested. LIMIT, RANGE, FORMAT as lathe__simplify_section; MEMORY. */
+lathe_status lathe__contour_set_simplify(lathe_contour_set *set, double tolerance_mm);
 /* The same with pixel staircases turned into polygons by the strip whose lines turn apart [L]: chords within tolerance. */
 lathe_status lathe__contour_set_strip(lathe_contour_set *set, double tolerance_mm);
-lathe_status lathe__contour_set_simplify(lathe_contour_set *set, double tolerance_mm);
 
 /* The first pair of edges of an outline that meet beyond a common vertex; edges are numbered by the vertices they begin in.
  * *found: whether there is one. tests: how many pairs may still be tried; LIMIT when they run out. MEMORY. */

@@ -6,7 +6,7 @@
 #define NONE UINT32_MAX
 
 static bool grow(void **array, uint32_t *capacity, uint32_t want, size_t size) {
-    if (want <= *capacity) return true;
+    if (want <= *capacity && *array) return true;
     uint32_t more = *capacity + *capacity / 2 + 64;
     if (more < want) more = want;
     void *p = realloc(*array, more * size);
@@ -75,7 +75,9 @@ static uint32_t group(lathe_edit_tree *t, uint32_t first, uint32_t second) {
 
 /* ---- a fold's pairs, divided between the level-1 nodes before and behind it ---- */
 
-static bool holds_pairs(const lathe_edit_tree *t, uint32_t part) { return !is_element(t->nodes[t->nodes[part].child].symbol); }
+static bool holds_pairs(const lathe_edit_tree *t, uint32_t part) {
+    return !is_element(t->nodes[t->nodes[part].child].symbol);
+}
 static uint32_t part_of(lathe_edit_tree *t, uint32_t pairs, uint32_t end, uint8_t symbol) {
     if (pairs == end) return NONE;
     if (t->nodes[pairs].next == end) {
@@ -101,18 +103,21 @@ static uint32_t first_pair(const lathe_edit_tree *t, uint32_t part) {
     return part == NONE ? NONE : holds_pairs(t, part) ? t->nodes[part].child : part;
 }
 
-/* An element's symbol changed (its ends are equally far out once rounded, so that an excursion is not what its single edge was): that may
- * change groups and divisions. Rare; done for the whole tree. */
+/* An element's symbol changed (its ends are equally far out once rounded, so that an excursion is not what its single
+ * edge was): that may change groups and divisions. Rare; done for the whole tree. */
 static lathe_status relabel(lathe_edit_tree *t, const lathe_edit_contour *c) {
     for (uint32_t i = 0; i < t->node_count; i++) {
         lathe_edit_node *n = &t->nodes[i];
-        if (n->child == NONE || n->symbol == LATHE_DER_F || !is_element(t->nodes[n->child].symbol) || is_element(n->symbol)) continue;
+        if (n->child == NONE || n->symbol == LATHE_DER_F || !is_element(t->nodes[n->child].symbol) ||
+            is_element(n->symbol))
+            continue;
         bool o = is_o(t->nodes[n->child].symbol), up = is_up(t->nodes[n->child].symbol);
         n->symbol = o ? (up ? LATHE_DER_U : LATHE_DER_D) : up ? LATHE_DER_U_R : LATHE_DER_D_R;
     }
     for (uint32_t ray = 0; ray < c->ray_count; ray++) {
         uint32_t before = t->level1[c->rays[ray].before], behind = t->level1[ray];
-        uint32_t pairs = first_pair(t, t->nodes[before].last), rest = first_pair(t, t->nodes[behind].child), last = pairs;
+        uint32_t pairs = first_pair(t, t->nodes[before].last), rest = first_pair(t, t->nodes[behind].child),
+                 last = pairs;
         if (!make_room(t, c, 2)) return LATHE_ERR_MEMORY;
         while (last != NONE && t->nodes[last].next != NONE) last = t->nodes[last].next;
         if (last != NONE) t->nodes[last].next = rest;
@@ -125,7 +130,9 @@ static lathe_status relabel(lathe_edit_tree *t, const lathe_edit_contour *c) {
 /* ---- leaves become subtrees ---- */
 
 /* Elements in a row between two leaves: the first alone, the others in twos. */
-typedef struct row { uint32_t parent, held, count; } row;
+typedef struct row {
+    uint32_t parent, held, count;
+} row;
 static void add_element(lathe_edit_tree *t, row *r, uint32_t element) {
     if (r->count++ == 0)
         add_child(t, r->parent, element);
@@ -152,14 +159,16 @@ static void split_single(lathe_edit_tree *t, const lathe_edit_contour *c, uint32
     add_leaf(t, element, last);
     check_symbol(t, c, element);
 }
-/* O -> f X b, X an O and pairs of a single i and an O: f -> f (o i)* f and b -> b (i o)* b; and where an i of X is crossed by the ray, too
- * (i -> b i (o i)* f), X comes apart, for an excursion ends where it first comes back to its ray:
+/* O -> f X b, X an O and pairs of a single i and an O: f -> f (o i)* f and b -> b (i o)* b; and where an i of X is
+ * crossed by the ray, too (i -> b i (o i)* f), X comes apart, for an excursion ends where it first comes back to its
+ * ray:
  *   f (o i)* O' [i (o i)* O']* (i o)* b   with O' -> f X' b.  I likewise. */
 static void split_excursion(lathe_edit_tree *t, const lathe_edit_contour *c, uint32_t element, uint32_t ray) {
     uint32_t child = t->nodes[element].child, begin = t->nodes[child].edge, end = t->nodes[t->nodes[element].last].edge;
     uint8_t symbol = t->nodes[element].symbol;
     const lathe_edit_crossing *first = &c->crossings[begin], *last = &c->crossings[end];
-    uint32_t x = first->split_first, x_last = x + first->split_count - 1, y = last->split_first, y_last = y + last->split_count - 1;
+    uint32_t x = first->split_first, x_last = x + first->split_count - 1, y = last->split_first,
+             y_last = y + last->split_count - 1;
     t->nodes[element].child = t->nodes[element].last = NONE;
     row r = {element, NONE, 0};
     child = t->nodes[child].next;
@@ -202,7 +211,7 @@ static void split_level1(lathe_edit_tree *t, const lathe_edit_contour *c, uint32
     for (uint32_t x = first; x < last; x += 2) {
         uint32_t o = single_element(t, c, x), i = single_element(t, c, x + 1), pair = group(t, o, i);
         *link = pair;
-        link = &t->nodes[pair].next;   /* nodes do not move: there was room for all */
+        link = &t->nodes[pair].next; /* nodes do not move: there was room for all */
     }
     settle_fold(t, node, behind, pairs);
 }
@@ -218,7 +227,8 @@ lathe_status lathe__edit_tree_refine(lathe_edit_tree *tree, const lathe_edit_con
     for (uint32_t k = 0; k < c->refined_count; k++) {
         uint32_t edge = c->refined[k], owner = tree->owner[edge];
         const lathe_edit_node *n = &tree->nodes[owner];
-        if (n->symbol != LATHE_DER_F && n->child != n->last && tree->nodes[n->child].edge == edge) split_excursion(tree, c, owner, ray);
+        if (n->symbol != LATHE_DER_F && n->child != n->last && tree->nodes[n->child].edge == edge)
+            split_excursion(tree, c, owner, ray);
     }
     for (uint32_t k = 0; k < c->refined_count; k++) {
         uint32_t edge = c->refined[k], owner = tree->owner[edge];
@@ -237,7 +247,8 @@ lathe_status lathe__edit_tree_refine(lathe_edit_tree *tree, const lathe_edit_con
 static lathe_status take_tree(lathe_edit_tree *t, const lathe_edit_contour *c, const lathe_derivation *d) {
     if (!make_room(t, c, d->node_count)) return LATHE_ERR_MEMORY;
     t->node_count = d->node_count;
-    for (uint32_t i = 0; i < d->node_count; i++) t->nodes[i] = (lathe_edit_node){d->nodes[i].symbol, NONE, NONE, NONE, NONE};
+    for (uint32_t i = 0; i < d->node_count; i++)
+        t->nodes[i] = (lathe_edit_node){d->nodes[i].symbol, NONE, NONE, NONE, NONE};
     for (uint32_t i = 1; i < d->node_count; i++) {
         const lathe_derivation_node *n = &d->nodes[i];
         if (n->symbol != LATHE_DER_F)
@@ -287,7 +298,7 @@ typedef struct writer {
     lathe_derivation tree;
     const lathe_edit_contour *contour;
     lathe_edit_tree *from;
-    uint32_t *edges;           /* NULL, or gets the edges in order */
+    uint32_t *edges; /* NULL, or gets the edges in order */
     uint32_t top, position;
     bool ok;
 } writer;
@@ -346,9 +357,11 @@ static void write_part(writer *w, uint32_t root) {
     }
 }
 
-lathe_status lathe__edit_tree_export(lathe_derivation *out, lathe_arena *arena, lathe_edit_tree *tree, const lathe_edit_contour *contour) {
+lathe_status lathe__edit_tree_export(lathe_derivation *out, lathe_arena *arena, lathe_edit_tree *tree,
+                                     const lathe_edit_contour *contour) {
     const lathe_edit_contour *c = contour;
-    writer w = {.contour = c, .from = tree, .top = NONE, .ok = true, .tree = {.rays = c->ray_count, .edge_count = c->count}};
+    writer w = {
+        .contour = c, .from = tree, .top = NONE, .ok = true, .tree = {.rays = c->ray_count, .edge_count = c->count}};
     w.tree.nodes = LATHE_NEW(arena, lathe_derivation_node, 3 * (size_t)c->count + 2);
     w.tree.level1 = LATHE_NEW(arena, uint32_t, c->ray_count);
     w.tree.main_edge = LATHE_NEW(arena, uint32_t, c->ray_count);
@@ -382,13 +395,18 @@ static uint32_t fold_length(const lathe_edit_contour *c, uint32_t before, uint32
 lathe_status lathe__edit_tree_fold(lathe_derivation *out, lathe_ray_contour *points, uint32_t **ids, lathe_arena *arena,
                                    lathe_edit_tree *tree, const lathe_edit_contour *contour, uint32_t ray) {
     const lathe_edit_contour *c = contour;
-    const lathe_edit_node *before = &tree->nodes[tree->level1[c->rays[ray].before]], *f = &tree->nodes[tree->level1[ray]];
+    const lathe_edit_node *before = &tree->nodes[tree->level1[c->rays[ray].before]],
+                          *f = &tree->nodes[tree->level1[ray]];
     uint32_t length = fold_length(c, before->edge, f->edge), count = length + 2;
     writer w = {.contour = c, .from = tree, .top = NONE, .ok = true, .tree = {.rays = 1, .edge_count = length + 1}};
     w.tree.nodes = LATHE_NEW(arena, lathe_derivation_node, 3 * (size_t)length + 4);
     w.tree.level1 = LATHE_NEW(arena, uint32_t, 2);
     w.edges = LATHE_NEW(arena, uint32_t, count);
-    lathe_ray_contour p = {.centre = c->centre, .rays = 1, .turn = c->turn, .count = count, .points = LATHE_NEW(arena, lathe_point, count)};
+    lathe_ray_contour p = {.centre = c->centre,
+                           .rays = 1,
+                           .turn = c->turn,
+                           .count = count,
+                           .points = LATHE_NEW(arena, lathe_point, count)};
     if (!w.tree.nodes || !w.tree.level1 || !w.edges || !p.points) return LATHE_ERR_MEMORY;
     w.tree.main_edge = w.tree.level1 + 1;
     w.tree.level1[0] = 0;

@@ -1,6 +1,7 @@
-/* See tube_surface.h. The triangles of a strip hang on rays: those of the fold on ray i and of the level-1 edge that leads from it to the next
- * one are group i. A group is made by walking the two contours' folds on that ray, so a new ray between i and the next makes group i and
- * its own anew, and those whose folds come there: on the next ray, and, with excursions, on rays farther away. */
+/* See tube_surface.h. The triangles of a strip hang on rays: those of the fold on ray i and of the level-1 edge that
+ * leads from it to the next one are group i. A group is made by walking the two contours' folds on that ray, so a new
+ * ray between i and the next makes group i and its own anew, and those whose folds come there: on the next ray, and,
+ * with excursions, on rays farther away. */
 #include "tube_surface.h"
 #include <stdlib.h>
 #include <string.h>
@@ -8,34 +9,39 @@
 #define NONE UINT32_MAX
 static const uint32_t MOST = (1u << 28) - 1;
 
-typedef struct triangle { uint32_t corner[3], next; } triangle;   /* next in its group; corner[0] == NONE: free, next free one */
+typedef struct triangle {
+    uint32_t corner[3], next;
+} triangle; /* next in its group; corner[0] == NONE: free, next free one */
 typedef struct slice {
     lathe_tube_loop loop;
     lathe_edit_contour contour;
-    uint32_t *vertex;          /* by crossing */
+    uint32_t *vertex; /* by crossing */
     uint32_t vertex_capacity, vertex_count, apex;
 } slice;
 typedef struct strip {
-    lathe_edit_tree right, left;   /* of the slice below, towards the one above; and the other way */
-    uint32_t *group;           /* by ray: its triangles */
-    uint32_t *made;            /* by ray: the last ray for whose sake it was made */
-    uint32_t *passed[2];       /* by edge of either contour: the last ray for whose sake it was passed on the way to its group */
+    lathe_edit_tree right, left; /* of the slice below, towards the one above; and the other way */
+    uint32_t *group;             /* by ray: its triangles */
+    uint32_t *made;              /* by ray: the last ray for whose sake it was made */
+    uint32_t
+        *passed[2]; /* by edge of either contour: the last ray for whose sake it was passed on the way to its group */
     uint32_t capacity, made_capacity, passed_capacity[2];
 } strip;
-typedef struct added_ray { uint32_t after, angle; } added_ray;
+typedef struct added_ray {
+    uint32_t after, angle;
+} added_ray;
 
 struct lathe_tube_surface {
     slice *slices;
-    strip *strips;             /* strips[k] joins slices k and k + 1 */
+    strip *strips; /* strips[k] joins slices k and k + 1 */
     uint32_t count, first_rays;
-    added_ray *added;          /* in the order in which they came */
+    added_ray *added; /* in the order in which they came */
     uint32_t added_count, added_capacity;
-    uint32_t *fan[2];          /* the ends' triangles by edge */
+    uint32_t *fan[2]; /* the ends' triangles by edge */
     uint32_t fan_capacity[2];
     int32_t (*vertices)[3];
     triangle *triangles;
     uint32_t vertex_count, vertex_capacity, triangle_count, triangle_capacity, free_triangle, live;
-    uint32_t (*fresh)[3], *match;  /* a group's new triangles, and which old ones they are */
+    uint32_t (*fresh)[3], *match; /* a group's new triangles, and which old ones they are */
     uint32_t fresh_count, fresh_capacity, match_capacity;
     lathe_tube_work work;
     lathe_arena scratch;
@@ -43,7 +49,7 @@ struct lathe_tube_surface {
 typedef lathe_tube_surface tube;
 
 static bool grow(void **array, uint32_t *capacity, uint32_t want, size_t size) {
-    if (want <= *capacity) return true;
+    if (want <= *capacity && *array) return true;
     uint32_t more = *capacity + *capacity / 2 + 64;
     if (want > MOST) return false;
     if (more < want) more = want;
@@ -77,7 +83,8 @@ static lathe_status add_vertex(tube *t, uint32_t *out, lathe_point p, int32_t he
 static lathe_status add_vertices(tube *t, slice *s) {
     if (!grow_indices(&s->vertex, &s->vertex_capacity, s->contour.count)) return LATHE_ERR_MEMORY;
     for (; s->vertex_count < s->contour.count; s->vertex_count++) {
-        lathe_status status = add_vertex(t, &s->vertex[s->vertex_count], s->contour.crossings[s->vertex_count].point, s->loop.height);
+        lathe_status status =
+            add_vertex(t, &s->vertex[s->vertex_count], s->contour.crossings[s->vertex_count].point, s->loop.height);
         if (status) return status;
     }
     return LATHE_OK;
@@ -127,7 +134,8 @@ static lathe_status refine_fan(tube *t, int end) {
     lathe_status status = LATHE_OK;
     if (!grow_indices(&t->fan[end], &t->fan_capacity[end], c->count)) return LATHE_ERR_MEMORY;
     for (uint32_t k = 0; k < c->refined_count && !status; k++) {
-        uint32_t edge = c->refined[k], first = c->crossings[edge].split_first, last = first + c->crossings[edge].split_count;
+        uint32_t edge = c->refined[k], first = c->crossings[edge].split_first,
+                 last = first + c->crossings[edge].split_count;
         remove_triangle(t, t->fan[end][edge]);
         status = set_fan_triangle(t, end, edge);
         for (uint32_t e = first; e < last && !status; e++) status = set_fan_triangle(t, end, e);
@@ -187,9 +195,11 @@ static lathe_status walk_group(tube *t, uint32_t k, uint32_t ray) {
     return status;
 }
 
-static uint32_t hash(const uint32_t corner[3]) { return (corner[0] * 0x9e3779b1u ^ corner[1] * 0x85ebca77u ^ corner[2] * 0xc2b2ae3du) * 0x27d4eb2fu; }
-/* Old triangles (a list) against t->fresh: match[i] becomes the old one that the i-th new one is, or NONE; the others are removed. Steps give corners
- * in the order lower slice first, so equal triangles are equal as they are written. */
+static uint32_t hash(const uint32_t corner[3]) {
+    return (corner[0] * 0x9e3779b1u ^ corner[1] * 0x85ebca77u ^ corner[2] * 0xc2b2ae3du) * 0x27d4eb2fu;
+}
+/* Old triangles (a list) against t->fresh: match[i] becomes the old one that the i-th new one is, or NONE; the others
+ * are removed. Steps give corners in the order lower slice first, so equal triangles are equal as they are written. */
 static lathe_status match_old(tube *t, uint32_t old) {
     uint32_t size = 16;
     while (size < 2 * t->fresh_count) size *= 2;
@@ -197,16 +207,17 @@ static lathe_status match_old(tube *t, uint32_t old) {
     uint32_t *table = LATHE_NEW(&t->scratch, uint32_t, size);
     if (!table || !grow_indices(&t->match, &t->match_capacity, t->fresh_count)) return LATHE_ERR_MEMORY;
     memset(table, 0xff, size * sizeof *table);
+    memset(t->match, 0xff, t->fresh_count * sizeof *t->match);
     for (uint32_t i = 0; i < t->fresh_count; i++) {
         uint32_t h = hash(t->fresh[i]) >> 7 & (size - 1);
         while (table[h] != NONE) h = (h + 1) & (size - 1);
         table[h] = i;
-        t->match[i] = NONE;
     }
     for (uint32_t next; old != NONE; old = next) {
         next = t->triangles[old].next;
         uint32_t h = hash(t->triangles[old].corner) >> 7 & (size - 1);
-        while (table[h] != NONE && memcmp(t->fresh[table[h]], t->triangles[old].corner, sizeof *t->fresh)) h = (h + 1) & (size - 1);
+        while (table[h] != NONE && memcmp(t->fresh[table[h]], t->triangles[old].corner, sizeof *t->fresh))
+            h = (h + 1) & (size - 1);
         if (table[h] == NONE)
             remove_triangle(t, old);
         else {
@@ -259,7 +270,8 @@ static void close_strip(strip *s) {
     free(s->passed[1]);
     *s = (strip){0};
 }
-static lathe_status choose_level1(const tube *t, uint32_t *chain[2], lathe_arena *arena, const lathe_edit_contour *a, const lathe_edit_contour *b) {
+static lathe_status choose_level1(const tube *t, uint32_t *chain[2], lathe_arena *arena, const lathe_edit_contour *a,
+                                  const lathe_edit_contour *b) {
     lathe_ray_contour plain[2];
     lathe_derivation d[2];
     lathe_status status = lathe__edit_export(&plain[0], NULL, arena, a);
@@ -309,7 +321,8 @@ static lathe_status open_strip(const tube *t, strip *out, const lathe_tube_loop 
 }
 static lathe_status fill_strip(tube *t, uint32_t k) {
     lathe_status status = LATHE_OK;
-    for (uint32_t ray = 0; ray < t->first_rays + t->added_count && !status; ray++) status = remake_groups(t, k, &ray, 1);
+    for (uint32_t ray = 0; ray < t->first_rays + t->added_count && !status; ray++)
+        status = remake_groups(t, k, &ray, 1);
     return status;
 }
 
@@ -381,7 +394,9 @@ lathe_status lathe__tube_open(lathe_tube_surface **out, const lathe_tube_loop *l
 static bool make_marks(strip *s, const lathe_edit_contour *a, const lathe_edit_contour *b) {
     const lathe_edit_contour *c[2] = {a, b};
     uint32_t had = s->made_capacity;
-    if (!grow_indices(&s->group, &s->capacity, a->ray_count) || !grow_indices(&s->made, &s->made_capacity, a->ray_count)) return false;
+    if (!grow_indices(&s->group, &s->capacity, a->ray_count) ||
+        !grow_indices(&s->made, &s->made_capacity, a->ray_count))
+        return false;
     for (; had < s->made_capacity; had++) s->made[had] = NONE;
     for (int k = 0; k < 2; k++) {
         had = s->passed_capacity[k];
@@ -390,7 +405,8 @@ static bool make_marks(strip *s, const lathe_edit_contour *a, const lathe_edit_c
     }
     return true;
 }
-/* Makes the groups anew to whose folds the edges belong that were split: on from each of them is the level-1 edge of its group. */
+/* Makes the groups anew to whose folds the edges belong that were split: on from each of them is the level-1 edge of
+ * its group. */
 static lathe_status remake_split(tube *t, uint32_t k, int side, uint32_t ray) {
     strip *s = &t->strips[k];
     const lathe_edit_contour *c = &t->slices[k + (uint32_t)side].contour;
@@ -515,7 +531,9 @@ lathe_status lathe__tube_insert_slice(lathe_tube_surface *t, const lathe_tube_lo
 uint32_t lathe__tube_slices(const lathe_tube_surface *t) { return t->count; }
 uint32_t lathe__tube_triangles(const lathe_tube_surface *t) { return t->live; }
 lathe_tube_work lathe__tube_work_done(const lathe_tube_surface *t) { return t->work; }
-const lathe_edit_contour *lathe__tube_contour(const lathe_tube_surface *t, uint32_t slice) { return &t->slices[slice].contour; }
+const lathe_edit_contour *lathe__tube_contour(const lathe_tube_surface *t, uint32_t slice) {
+    return &t->slices[slice].contour;
+}
 uint32_t lathe__tube_vertex(const lathe_tube_surface *t, uint32_t slice, uint32_t crossing) {
     return crossing == NONE ? t->slices[slice].apex : t->slices[slice].vertex[crossing];
 }
@@ -529,7 +547,8 @@ lathe_status lathe__tube_mesh(lathe_mesh *out, const lathe_tube_surface *t) {
     }
     memcpy(m.lattice, t->vertices, t->vertex_count * sizeof *m.lattice);
     for (uint32_t i = 0; i < t->triangle_count; i++)
-        if (t->triangles[i].corner[0] != NONE) memcpy(m.triangles[m.triangle_count++], t->triangles[i].corner, sizeof *m.triangles);
+        if (t->triangles[i].corner[0] != NONE)
+            memcpy(m.triangles[m.triangle_count++], t->triangles[i].corner, sizeof *m.triangles);
     *out = m;
     return LATHE_OK;
 }

@@ -4,11 +4,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { DIRECTIONS = 720, FARTHEST = 90 /* 45 degrees */, AROUND = 2 };
+enum { DIRECTIONS = 720, HALF_TURN = DIRECTIONS / 2, FARTHEST = 90 /* 45 degrees */, AROUND = 2 };
 static const double FULL_TURN = 6.283185307179586;
-static const double ROUND = 0.01;      /* profiles that vary by less than this part of their mean say nothing about turns */
-static const double HALVED = 0.5;      /* what a believable turn leaves of the difference */
-static const double UNSTEADY = 5;      /* degrees by which turns may differ from the median of those around, on average */
+static const double ROUND = 0.01; /* profiles that vary by less than this part of their mean say nothing about turns */
+static const double HALVED = 0.5; /* what a believable turn leaves of the difference */
+static const double UNSTEADY = 5; /* degrees by which turns may differ from the median of those around, on average */
 
 lathe_status lathe__parse_twist(lathe_twist *out, const char *text, lathe_error *err) {
     if (!strcmp(text, "none")) {
@@ -29,14 +29,18 @@ lathe_status lathe__parse_twist(lathe_twist *out, const char *text, lathe_error 
 
 /* ---- profiles ---- */
 
-typedef struct profile { double at[DIRECTIONS]; bool flat; } profile;   /* mean 0, variance 1; flat: round, or nothing there */
+typedef struct profile {
+    double at[DIRECTIONS];
+    bool flat;
+} profile; /* mean 0, variance 1; flat: round, or nothing there */
 
 static double area_and_centre(const lathe_point *p, uint32_t n, double centre[2]) {
     double area = 0, x = 0, y = 0;
     for (uint32_t i = 0; i < n; i++) {
         /* Relative to the first point: squares of coordinates would lose digits. */
         lathe_point q = p[i + 1 < n ? i + 1 : 0];
-        double ax = (double)p[i].x - p[0].x, ay = (double)p[i].y - p[0].y, bx = (double)q.x - p[0].x, by = (double)q.y - p[0].y;
+        double ax = (double)p[i].x - p[0].x, ay = (double)p[i].y - p[0].y, bx = (double)q.x - p[0].x,
+               by = (double)q.y - p[0].y;
         double c = ax * by - ay * bx;
         area += c, x += c * (ax + bx), y += c * (ay + by);
     }
@@ -46,12 +50,14 @@ static double area_and_centre(const lathe_point *p, uint32_t n, double centre[2]
 }
 /* The directions that a segment covers; the farthest radius counts. */
 static void add_segment(double *radius, double px, double py, double qx, double qy) {
-    double from = atan2(py, px) * DIRECTIONS / FULL_TURN, to = atan2(qy, qx) * DIRECTIONS / FULL_TURN, turns = px * qy - py * qx;
-    if (to - from > DIRECTIONS / 2) to -= DIRECTIONS;
-    if (to - from < -DIRECTIONS / 2) to += DIRECTIONS;
+    double from = atan2(py, px) * DIRECTIONS / FULL_TURN, to = atan2(qy, qx) * DIRECTIONS / FULL_TURN,
+           turns = px * qy - py * qx;
+    if (to - from > HALF_TURN) to -= DIRECTIONS;
+    if (to - from < -HALF_TURN) to += DIRECTIONS;
     int first = (int)ceil(from < to ? from : to), last = (int)floor(from < to ? to : from);
     for (int k = first; k <= last; k++) {
-        double c = cos(k * FULL_TURN / DIRECTIONS), s = sin(k * FULL_TURN / DIRECTIONS), across = c * (qy - py) - s * (qx - px);
+        double c = cos(k * FULL_TURN / DIRECTIONS), s = sin(k * FULL_TURN / DIRECTIONS),
+               across = c * (qy - py) - s * (qx - px);
         double r = across != 0 ? turns / across : hypot(px, py);
         double *at = &radius[(k + 2 * DIRECTIONS) % DIRECTIONS];
         if (r > *at) *at = r;
@@ -63,7 +69,9 @@ static void make_profile(profile *out, const lathe_outline *outline) {
     memset(out, 0, sizeof *out);
     out->flat = true;
     for (uint32_t i = 0; i < outline->loop_count; i++) {
-        double c[2], area = outline->loops[i].count ? area_and_centre(outline->points + outline->loops[i].first, outline->loops[i].count, c) : 0;
+        double c[2], area = outline->loops[i].count
+                                ? area_and_centre(outline->points + outline->loops[i].first, outline->loops[i].count, c)
+                                : 0;
         if (area <= largest) continue;
         largest = area;
         loop = &outline->loops[i];
@@ -86,10 +94,13 @@ static void make_profile(profile *out, const lathe_outline *outline) {
 /* b turned back by s directions against a: 1 if they are the same shape. */
 static double correlate(const profile *a, const profile *b, int s) {
     double sum = 0;
-    for (int k = 0, j = s < 0 ? s + DIRECTIONS : s; k < DIRECTIONS; k++, j = j + 1 < DIRECTIONS ? j + 1 : 0) sum += a->at[k] * b->at[j];
+    for (int k = 0, j = s < 0 ? s + DIRECTIONS : s; k < DIRECTIONS; k++, j = j + 1 < DIRECTIONS ? j + 1 : 0)
+        sum += a->at[k] * b->at[j];
     return sum / DIRECTIONS;
 }
-typedef struct step { double degrees, unturned, turned; } step;   /* what is left of 1 without and with the turn */
+typedef struct step {
+    double degrees, unturned, turned;
+} step; /* what is left of 1 without and with the turn */
 
 static step best_step(const profile *a, const profile *b) {
     if (a->flat || b->flat) return (step){0, 0, 0};
@@ -102,7 +113,7 @@ static step best_step(const profile *a, const profile *b) {
             if (c[sign * s + FARTHEST + 1] > c[best + FARTHEST + 1] + 1e-9) best = sign * s;
     const double *at = &c[best + FARTHEST + 1];
     double bend = at[-1] - 2 * at[0] + at[1], shift = bend < 0 ? (at[-1] - at[1]) / (2 * bend) : 0;
-    if (fabs(shift) > 0.5) shift = 0;   /* at the end of the range, no peak */
+    if (fabs(shift) > 0.5) shift = 0; /* at the end of the range, no peak */
     return (step){(best + shift) * 360 / DIRECTIONS, 1 - c[FARTHEST + 1], 1 - at[0]};
 }
 
@@ -145,7 +156,8 @@ static lathe_status find_steps(double *degrees, const lathe_section *sections, u
     return status;
 }
 
-lathe_status lathe__choose_turns(uint32_t *turn, double *degrees, const lathe_section *sections, uint32_t count, const lathe_twist *twist) {
+lathe_status lathe__choose_turns(uint32_t *turn, double *degrees, const lathe_section *sections, uint32_t count,
+                                 const lathe_twist *twist) {
     if (!count) return LATHE_OK;
     double *steps = calloc(count, sizeof *steps), sum = 0;
     if (!steps) return LATHE_ERR_MEMORY;
@@ -161,7 +173,8 @@ lathe_status lathe__choose_turns(uint32_t *turn, double *degrees, const lathe_se
     return status;
 }
 
-lathe_status lathe__turn_sections(uint32_t ***out, lathe_arena *arena, const lathe_section *sections, uint32_t count, const lathe_twist *twist) {
+lathe_status lathe__turn_sections(uint32_t ***out, lathe_arena *arena, const lathe_section *sections, uint32_t count,
+                                  const lathe_twist *twist) {
     uint32_t *turn = LATHE_NEW(arena, uint32_t, count), **all = LATHE_NEW(arena, uint32_t *, count);
     if (!turn || !all) return LATHE_ERR_MEMORY;
     lathe_status status = lathe__choose_turns(turn, NULL, sections, count, twist);

@@ -1,0 +1,98 @@
+// Makes a set of golden streams: node tests/golden/make_golden.mjs FOLDER [LATHE]. The ones in this folder are kept: what they decode
+// to must never change, so nothing runs this by itself. A new version of the format gets new streams beside the old ones.
+import { execFileSync } from 'node:child_process';
+import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+
+const [folder, lathe = 'build/lathe'] = process.argv.slice(2);
+if (!folder) throw Error('usage: make_golden.mjs FOLDER [LATHE]');
+const scratch = mkdtempSync(join(tmpdir(), 'lathe-golden-'));
+const ball = (x, y, z, r) => r - Math.hypot(x, y, z);
+
+/** Noise in -1 .. 1, smooth over about `size` voxels: components, cavities and tunnels of every kind. */
+function foam(size) {
+    const at = (i, j, k) => {
+        let h = Math.imul(i, 0x9e3779b1) ^ Math.imul(j, 0x85ebca77) ^ Math.imul(k, 0xc2b2ae3d);
+        h = Math.imul(h ^ (h >>> 15), 0x2c1b3c6d);
+        return ((h ^ (h >>> 12)) >>> 0) / 2 ** 31 - 1;
+    };
+    return (x, y, z) => {
+        const p = [x, y, z].map((c) => c / size), low = p.map(Math.floor);
+        const t = p.map((c, i) => (c - low[i]) ** 2 * (3 - 2 * (c - low[i])));
+        let sum = 0;
+        for (let k = 0; k < 8; k++) {
+            const bit = [k & 1, (k >> 1) & 1, k >> 2];
+            sum += at(low[0] + bit[0], low[1] + bit[1], low[2] + bit[2]) * bit.reduce((w, b, i) => w * (b ? t[i] : 1 - t[i]), 1);
+        }
+        return sum;
+    };
+}
+
+function values(dims, at) {
+    const out = new Float32Array(dims[0] * dims[1] * dims[2]);
+    let i = 0;
+    for (let z = 0; z < dims[2]; z++) for (let y = 0; y < dims[1]; y++) for (let x = 0; x < dims[0]; x++) out[i++] = at(x, y, z);
+    return Buffer.from(out.buffer);
+}
+
+function raw(name, dims, at, spacing = [1, 1, 1]) {
+    writeFileSync(join(scratch, name + '.raw'), values(dims, at));
+    const path = join(scratch, name + '.json');
+    writeFileSync(path, JSON.stringify({ file: name + '.raw', dims, dtype: 'float32', spacing }));
+    return path;
+}
+
+/** NIfTI-1 with an affine of its own. */
+function nifti(name, dims, at, affine) {
+    const head = Buffer.alloc(352);
+    head.writeInt32LE(348, 0);
+    [3, ...dims, 1, 1, 1, 1].forEach((v, i) => head.writeInt16LE(v, 40 + 2 * i));
+    head.writeInt16LE(16, 70);
+    head.writeInt16LE(32, 72);
+    [1, ...[0, 1, 2].map((c) => Math.hypot(...affine.map((row) => row[c]))), 0, 0, 0, 0].forEach((v, i) => head.writeFloatLE(v, 76 + 4 * i));
+    head.writeFloatLE(352, 108);
+    head.writeFloatLE(1, 112);
+    head[123] = 2;
+    head.writeInt16LE(1, 254);
+    affine.flat().forEach((v, i) => head.writeFloatLE(v, 280 + 4 * i));
+    head.write('n+1\0', 344, 'latin1');
+    const path = join(scratch, name + '.nii');
+    writeFileSync(path, Buffer.concat([head, values(dims, at)]));
+    return path;
+}
+
+function bake(name, input, ...options) {
+    execFileSync(lathe, ['bake', input, '--name', name, '--no-draco', '--quiet', '-o', join(folder, name + '.lathe'), ...options]);
+}
+
+mkdirSync(folder, { recursive: true });
+const rough = foam(5), fine = foam(3);
+const blob = (x, y, z) => ball(x - 19, y - 18, z - 16, 13) / 8 + 1.5 * rough(x, y, z) + 0.5 * fine(x, y, z);
+const label = (x, y, z) => {
+    if (ball(x - 10, y - 10, z - 10, 7.5) > 0) return 1;                        /* becomes a radius map */
+    if (Math.abs(Math.hypot(x - 30, z - 14) - 8) < 3 && Math.abs(y - 12) < 4) return 2;
+    if (y > 20 && rough(x, y, z) + fine(x, y, z) > 0.5) return 3;                              /* many components */
+    return x > 40 && y < 6 && z > 4 && z < 9 ? 7 : 0;                           /* a small box */
+};
+const cone = (x, y, z) => 13 + 3 * Math.cos(3 * (Math.atan2(y - 19, x - 18 - z / 30) - z / 12)) - Math.hypot(y - 19, x - 18 - z / 30) - ((z - 16) / 9) ** 2;
+
+bake('caps', raw('caps', [40, 37, 33], blob), '--iso', '0');
+bake('exact', raw('exact', [24, 24, 24], (x, y, z) => ball(x - 12, y - 12, z - 12, 9)), '--iso', '0', '--exact');
+bake('keep', raw('keep', [26, 25, 22], (x, y, z) => ball(x - 13, y - 12, z - 11, 11) / 9 + fine(x, y, z)), '--iso', '0', '--topology', 'keep');
+bake('keep_stars', raw('keep_stars', [30, 24, 28], (x, y, z) => ball(x - 13, y - 12, (z - 14) * 0.8, 9) + rough(x, y, z)), '--iso', '0', '--topology', 'keep');
+bake('radius', raw('radius', [30, 30, 30], (x, y, z) => ball(x - 14.5, y - 15, z - 15.2, 12)), '--iso', '0');
+bake('twisted', raw('twisted', [36, 38, 33], cone), '--iso', '0');
+bake('shared', raw('shared', [48, 32, 26], label), '--labels', 'all');
+bake('independent', raw('independent', [48, 32, 26], label, [1, 1, 1.5]), '--labels', 'all', '--independent');
+bake('keep_labels', raw('keep_labels', [48, 32, 26], label), '--labels', 'all', '--topology', 'keep', '--axis', 'x');
+/* Turned, sheared by its spacing, mirrored. */
+const tilt = [[-0.8, 0.45, 0.3, 12.5], [0.36, 1.1, -0.7, -40], [-0.12, 0.2, 2.3, 7.25]];
+bake('oblique', nifti('oblique', [40, 37, 33], (x, y, z) => 100 + 60 * blob(x, y, z), tilt), '--iso', '100');
+bake('oblique_radius', nifti('oblique_radius', [38, 33, 36], (x, y, z) => cone(z, x, y), tilt), '--iso', '0', '--axis', 'y');
+/* Slices wide enough for larger tables: 18 and 20 bits. */
+const disc = (r, n) => (x, y, z) => Math.min(r - Math.hypot(x - n / 2, y - n / 2 + 3 * z), Math.hypot(x - n / 3, y - n / 2) - r / 4) + 9 * rough(x, y, z);
+bake('wide', raw('wide', [100, 100, 5], disc(38, 100)), '--iso', '0');
+bake('wider', raw('wider', [150, 140, 3], disc(58, 150)), '--iso', '0', '--boundary', 'edge');
+bake('thin', raw('thin', [20, 16, 1], (x, y) => ball(x - 9, y - 8, 0, 6) + rough(x, y, 3)), '--iso', '0');
+rmSync(scratch, { recursive: true });
