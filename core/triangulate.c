@@ -3,14 +3,8 @@
  * polygons; it ends also where rounding has folded one. */
 #include "grid.h"
 #include "overlay.h"
-#include <string.h>
 
 enum { NONE = 0xffffffffu, BRIDGE = 0x80000000u, PLACES_PER_CELL = 4, FLIP_TURNS = 48 };
-
-typedef struct bridge {        /* one of those that pass a row of the grid */
-    uint32_t edge;
-    struct bridge *more;
-} bridge;
 
 typedef struct ring {
     uint32_t *node, *next, *prev;  /* places of one doubly linked ring */
@@ -23,7 +17,7 @@ typedef struct ring {
     uint32_t places;
     const lathe_point *positions;  /* node -> position */
     lathe_grid grid;               /* of the rings' edges, each numbered as its first place */
-    bridge **bridges;              /* by row of the grid */
+    uint32_t rim;                  /* places of the rings; behind them two for each bridge */
 } ring;
 
 /* Does the place see another one through its interior angle? */
@@ -80,8 +74,8 @@ static uint32_t first_on_the_left(const ring *r, uint32_t hole) {
     uint32_t best = NONE;
     const lathe_grid *grid = &r->grid;
     int32_t y = h.y >> grid->shift;
-    for (const bridge *b = r->bridges[y - grid->cells.y0]; b; b = b->more)
-        if (lathe__is_nearer_left(&nearest, h, r->at[b->edge], r->at[r->end[b->edge]])) best = b->edge;
+    for (uint32_t i = r->rim; i < r->places; i += 2)
+        if (lathe__is_nearer_left(&nearest, h, r->at[i], r->at[i + 1])) best = i;
     for (int32_t x = h.x >> grid->shift; x >= grid->cells.x0 && nearest.x < ((double)x + 1) * (1 << grid->shift); x--) {
         size_t cell = lathe__cell_at(grid, x, y);
         for (uint32_t k = grid->first[cell]; k < grid->first[cell + 1]; k++) {
@@ -118,8 +112,8 @@ static uint32_t place_to_bridge(const ring *r, uint32_t hole) {
 }
 
 /* Joins a hole to the ring. */
-static lathe_status bridge_hole(ring *r, lathe_arena *arena, uint32_t leftmost) {
-    uint32_t place = place_to_bridge(r, leftmost), place2 = add_twin(r, place), left2 = add_twin(r, leftmost);
+static void bridge_hole(ring *r, uint32_t leftmost) {
+    uint32_t place = place_to_bridge(r, leftmost), left2 = add_twin(r, leftmost), place2 = add_twin(r, place);
     uint32_t after = r->next[place], before = r->prev[leftmost];
     link_places(r, place, leftmost);
     link_places(r, before, left2);
@@ -131,14 +125,6 @@ static lathe_status bridge_hole(ring *r, lathe_arena *arena, uint32_t leftmost) 
     r->across[place2] = beyond;
     r->across[place] = BRIDGE + left2;
     r->across[left2] = BRIDGE + place;
-    lathe_range box = lathe__range_of(r->at[place], r->at[leftmost]);
-    for (int32_t y = box.y0 >> r->grid.shift; y <= box.y1 >> r->grid.shift; y++) {
-        bridge *b = LATHE_NEW(arena, bridge, 1), **row = &r->bridges[y - r->grid.cells.y0];
-        if (!b) return LATHE_ERR_MEMORY;
-        *b = (bridge){left2, *row};
-        *row = b;
-    }
-    return LATHE_OK;
 }
 
 static bool is_ear(const ring *r, uint32_t place) {
@@ -280,17 +266,6 @@ static void sort_holes(const ring *r, uint32_t *hole, uint32_t count) {
         }
 }
 
-static lathe_status bridge_holes(ring *r, lathe_arena *arena, uint32_t *hole, uint32_t count) {
-    size_t rows = (size_t)(r->grid.cells.y1 - r->grid.cells.y0) + 1;
-    lathe_status status = LATHE_OK;
-    r->bridges = LATHE_NEW(arena, bridge *, rows);
-    if (!r->bridges) return LATHE_ERR_MEMORY;
-    memset(r->bridges, 0, rows * sizeof *r->bridges);
-    sort_holes(r, hole, count);
-    for (uint32_t i = 0; !status && i < count; i++) status = bridge_hole(r, arena, hole[i]);
-    return status;
-}
-
 lathe_status lathe__triangulate(uint32_t (**triangles)[3], uint32_t **neighbour, uint32_t *count, lathe_arena *arena,
                                 const lathe_polygon *polygon) {
     uint32_t nodes = polygon->ring_end[polygon->ring_count - 1], holes = polygon->ring_count - 1;
@@ -312,8 +287,10 @@ lathe_status lathe__triangulate(uint32_t (**triangles)[3], uint32_t **neighbour,
     for (uint32_t i = 0, begin = 0; i <= holes; begin = polygon->ring_end[i++])
         hole[i] = add_ring(&r, polygon->nodes + begin, polygon->ring_end[i] - begin);
     lathe_status status = build_grid(&r, arena);
-    if (!status && holes) status = bridge_holes(&r, arena, hole + 1, holes);
     if (status) return status;
+    r.rim = nodes;
+    sort_holes(&r, hole + 1, holes);
+    for (uint32_t i = 1; i <= holes; i++) bridge_hole(&r, hole[i]);
     *count = clip_ears(&r, queue, *triangles);
     flip(**triangles, *neighbour, polygon->at, *count);
     return LATHE_OK;

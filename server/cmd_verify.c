@@ -10,7 +10,7 @@
 #include <string.h>
 
 typedef struct level_result {
-    bool seen, last;
+    bool seen;
     bool topology;                 /* must be that of the voxels: the last level, and every level of an archive that keeps it */
     lathe_mesh_report report;
     uint64_t float_duplicates;
@@ -53,7 +53,7 @@ static bool level_passes(const structure_result *structure, const level_result *
     if (!level->seen || !level->counts_match || level->encoded_differs) return false;
     if (edge_flaws(&level->report) || shape_flaws(level)) return false;
     if (level->topology && structure->compared && !topology_matches(structure, level)) return false;
-    return !level->last || !level->report.self_intersections;
+    return !level->report.self_intersections;
 }
 
 /* ---- gathering ---- */
@@ -72,7 +72,6 @@ static lathe_status prepare(verification *v) {
         uint32_t levels = v->info->structures[i].level_count;
         v->structures[i].levels = calloc(levels ? levels : 1, sizeof(level_result));
         if (!v->structures[i].levels) return LATHE_ERR_MEMORY;
-        if (levels) v->structures[i].levels[levels - 1].last = true;
         for (uint32_t n = 0; n < levels; n++) v->structures[i].levels[n].topology = v->info->keep_topology || n + 1 == levels;
     }
     return LATHE_OK;
@@ -266,7 +265,7 @@ static void print_flaw(const verification *v, uint32_t i, uint32_t n) {
                ") duplicate positions, %" PRIu64 " unused vertices, %" PRIu64 " bad indices;",
                r->nonmanifold_vertices, r->degenerate_triangles, r->duplicate_positions, level->float_duplicates,
                r->unused_vertices, r->bad_indices);
-    if (level->last && r->self_intersections) printf(" %" PRIu64 " self-intersections;", r->self_intersections);
+    if (r->self_intersections) printf(" %" PRIu64 " self-intersections;", r->self_intersections);
     if (level->topology && s->compared && !topology_matches(s, level))
         printf(" %" PRIu64 " components and Euler characteristic %" PRId64 ", the voxels have %" PRId64 " and %" PRId64 ";",
                r->components, r->euler, s->expected_components, s->expected_euler);
@@ -369,8 +368,8 @@ const lathe_command lathe__command_verify = {
     "verify", "check every level of an archive",
     "Usage: lathe verify [--json] [--no-intersections] [--no-rebake] FILE [VOLUME]\n\n"
     "Checks the checksums of FILE (.lathe), decodes it, and checks every level of every structure: closed, 2-manifold,\n"
-    "oriented, no degenerate triangle, no two vertices at one position, vertices and triangles as the index says;\n"
-    "self-intersections are counted and must be 0 at the last level. With the VOLUME it was baked from: components and\n"
+    "oriented, no degenerate triangle, no two vertices at one position, no two triangles that intersect, vertices and\n"
+    "triangles as the index says. With the VOLUME it was baked from: components and\n"
     "Euler characteristic of the last level (with --topology keep: of every level) are those of the voxels, which are\n"
     "counted independently; and the meshes are\n"
     "those that the volume gives when it is baked again.\n"

@@ -34,11 +34,14 @@ ok "ch2bet: last level" json "$here/ch2bet.info" '(l => l.error_rms_mm <= 0.15 &
 ok "aal: last level" json "$here/aal.info" '(l => l.error_rms_mm <= 0.25 && l.error_max_mm <= 2)(j.levels.at(-1))'
 ok "aal: names from the table" json "$here/aal.info" 'j.structures.length === 116 && j.structures.some(s => s.name === "Thalamus_L")'
 
+# An independent look at every level: the positions are those of the files, 32 bit floats in mm.
 if [ -x "$programs/cgal_check" ]; then
-    "$lathe" export "$here/ch2bet.lathe" -o "$here/ch2bet.stl"
-    ok "CGAL: ch2bet is closed and does not intersect itself" "$programs/cgal_check" "$here/ch2bet.stl"
-    "$lathe" export "$here/aal.lathe" --structure Thalamus_L -o "$here/thalamus.stl"
-    ok "CGAL: the left thalamus too" "$programs/cgal_check" "$here/thalamus.stl"
+    for level in 0 1 2 3 4; do
+        "$lathe" export "$here/ch2bet.lathe" --level $level -o "$here/ch2bet.stl"
+        ok "CGAL: ch2bet at level $level is closed and does not intersect itself" "$programs/cgal_check" "$here/ch2bet.stl"
+        "$lathe" export "$here/aal.lathe" --level $level -o "$here/aal.stl"
+        ok "CGAL: every structure of aal at level $level too" "$programs/cgal_check" --each "$here/aal.stl"
+    done
 fi
 ok "wasm builds the same meshes" node -e '
     const { execFileSync } = require("child_process");

@@ -4,6 +4,7 @@
 #include "check.h"
 #include "level.h"
 #include "mesh.h"
+#include "slice_pairs.h"
 
 static uint32_t seed = 1;
 static uint32_t next_random(void) {
@@ -73,8 +74,8 @@ static void check_whole(const lathe_mask *m, const char *what) {
     lathe_mesh_free(&mesh);
 }
 
-/* Fewer slices, fewer rays: still closed and manifold. */
-static uint64_t check_coarse(const lathe_mask *m, uint32_t coarseness, const char *what) {
+/* Fewer slices, fewer rays: still closed, manifold and free of intersections. */
+static void check_coarse(const lathe_mask *m, uint32_t coarseness, const char *what) {
     lathe_level_plan plan = {.slices = m->size[2], .level_count = coarseness + 1};
     lathe_arena list = {0};
     int32_t *slices;
@@ -85,7 +86,7 @@ static uint64_t check_coarse(const lathe_mask *m, uint32_t coarseness, const cha
     lathe_mesh_report r = {0};
     if (CHECK(lathe__build_surface(&mesh, arena, m, slices, count, 32, coarseness, &counts) == LATHE_OK)) {
         CHECK(lathe__mesh_check(&r, &mesh, true) == LATHE_OK);
-        if (!CHECK(closed(&r)))
+        if (!(CHECK(closed(&r)) & CHECK_EQ(r.self_intersections, 0)))
             fprintf(stderr, "  in %s: boundary %llu nonmanifold %llu/%llu misoriented %llu degenerate %llu duplicate %llu contacts %llu\n", what,
                     (unsigned long long)r.boundary_edges, (unsigned long long)r.nonmanifold_edges, (unsigned long long)r.nonmanifold_vertices,
                     (unsigned long long)r.misoriented_edges, (unsigned long long)r.degenerate_triangles, (unsigned long long)r.duplicate_positions,
@@ -93,7 +94,6 @@ static uint64_t check_coarse(const lathe_mask *m, uint32_t coarseness, const cha
     }
     lathe_mesh_free(&mesh);
     lathe__arena_free(&list);
-    return r.self_intersections;
 }
 
 static void ball(lathe_mask *m, int size, int slices, double radius, double hollow) {
@@ -111,12 +111,12 @@ static void known_shapes(void) {
     lathe_mask m;
     ball(&m, 30, 29, 14.2, 0);
     check_whole(&m, "ball");
-    CHECK_EQ(check_coarse(&m, 1, "ball, coarse"), 0);
-    CHECK_EQ(check_coarse(&m, 2, "ball, coarser"), 0);
+    check_coarse(&m, 1, "ball, coarse");
+    check_coarse(&m, 2, "ball, coarser");
     lathe__mask_free(&m);
     ball(&m, 30, 29, 14.2, 8);
     check_whole(&m, "nested shells");
-    CHECK_EQ(check_coarse(&m, 1, "nested shells, coarse"), 0);
+    check_coarse(&m, 1, "nested shells, coarse");
     lathe__mask_free(&m);
     int32_t dims[3] = {3, 3, 1}, origin[3] = {0, 0, 0};
     if (lathe__mask_new(&m, dims, origin)) abort();
@@ -125,9 +125,26 @@ static void known_shapes(void) {
     lathe__mask_free(&m);
 }
 
+/* Pairs that gave flaws before outlines kept room and holes had bridges that are seen, and as many others as `make test` has time
+ * for; `make soak` goes on. */
+static void random_pairs(void) {
+    static const uint64_t known[] = {17510, 54196, 1015036, 1017798, 1122693, 1132265, 1134630};
+    for (uint64_t i = 0; i < 10000 + sizeof known / sizeof *known; i++) {
+        uint64_t number = i < 10000 ? i : known[i - 10000];
+        slice_pair p = pair_draw(number, 1);
+        for (int exact = 0; exact < 2; exact++) {
+            const char *fault = pair_fault(&p, arena, exact);
+            if (!CHECK(!*fault)) fprintf(stderr, "  pair %llu (%s), %s: the surface %s\n", (unsigned long long)number, pair_kind_name[p.kind],
+                                         exact ? "exact" : "coarse", fault);
+        }
+        lathe__mask_free(&p.mask);
+        if (check_failed > 20) break;
+    }
+}
+
 int main(void) {
     known_shapes();
-    uint64_t coarse_intersections = 0;
+    random_pairs();
     for (int i = 0; i < 4000; i++) {
         lathe_mask m;
         char what[96];
@@ -136,11 +153,10 @@ int main(void) {
         snprintf(what, sizeof what, "random %d: size %d, %d slices, density %d, smoothing %d", i, size, slices, density, smoothing);
         random_mask(&m, size, slices, density, smoothing);
         check_whole(&m, what);
-        coarse_intersections += check_coarse(&m, 1 + next_random() % 3, what);
+        check_coarse(&m, 1 + next_random() % 3, what);
         lathe__mask_free(&m);
         if (check_failed > 20) break;
     }
-    fprintf(stderr, "self-intersections of coarse levels of noise: %llu\n", (unsigned long long)coarse_intersections);
     lathe__arena_free(&arena[0]);
     lathe__arena_free(&arena[1]);
     return check_end();
