@@ -65,6 +65,8 @@ typedef struct lathe_bake_arguments {
     const char *input, *output, *name;
     const char *iso, *label, *labels, *axis, *boundary, *topology, *spacing;
     bool errors, draco, quiet, exact, independent;
+    int (*progress)(void *context, const char *stage, double fraction);   /* NULL: a bar on a terminal */
+    void *progress_context;
 } lathe_bake_arguments;
 void lathe__bake_arguments_defaults(lathe_bake_arguments *arguments);
 /* command is for complaints about usage. Returns an exit status. */

@@ -161,8 +161,8 @@ static int bake_volume(const lathe_volume *volume, const bake_settings *settings
     options.measure = a->errors;
     options.draco = a->draco;
     lathe_progress progress;
-    options.progress = lathe__progress_step;
-    options.progress_context = &progress;
+    options.progress = a->progress ? a->progress : lathe__progress_step;
+    options.progress_context = a->progress ? a->progress_context : &progress;
     lathe_error err = {{0}};
     lathe__progress_begin(&progress, options.name, a->quiet);
     lathe_status status = lathe_bake_file(volume, &options, a->output, &err);

@@ -1,5 +1,6 @@
 /* lathe bench: how fast an archive decodes. lathe hash: one number for the last meshes, to compare platforms. */
-#include "cli.h"
+#include "bench.h"
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -27,7 +28,7 @@ const uint8_t *lathe__whole_stream(const lathe_model *model, size_t *size) {
 /* Decodes the stream. Every level's mesh is built if all_levels, else only each structure's last. */
 typedef struct decode_result { uint64_t triangles, vertices, last_triangles, hash; double seconds; } decode_result;
 
-static double cpu_seconds(void) {
+double lathe__cpu_seconds(void) {
     struct timespec now;
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
@@ -46,8 +47,44 @@ static lathe_status step_through(lathe_decoder *decoder, bool all_levels, decode
     }
 }
 
+/* ---- with what a renderer needs besides ---- */
+
+static void add_normals(float *normals, const float *positions, const uint32_t *indices, uint32_t triangle_count) {
+    for (uint32_t i = 0; i < triangle_count; i++, indices += 3) {
+        const float *a = positions + 3 * (size_t)indices[0], *b = positions + 3 * (size_t)indices[1], *c = positions + 3 * (size_t)indices[2];
+        float p[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, q[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+        float n[3] = {p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]};
+        for (int corner = 0; corner < 3; corner++)
+            for (int k = 0; k < 3; k++) normals[3 * (size_t)indices[corner] + (size_t)k] += n[k];
+    }
+}
+
+static void make_unit(float *normals, uint32_t vertex_count) {
+    for (uint32_t i = 0; i < vertex_count; i++, normals += 3) {
+        float length = sqrtf(normals[0] * normals[0] + normals[1] * normals[1] + normals[2] * normals[2]);
+        float scale = length > 0 ? 1 / length : 0;
+        for (int k = 0; k < 3; k++) normals[k] *= scale;
+    }
+}
+
+static lathe_status dress_mesh(const lathe_mesh *mesh, const lathe_transform *transform) {
+    float *positions = malloc((size_t)mesh->vertex_count * 12 + 1), *normals = calloc((size_t)mesh->vertex_count + 1, 12);
+    uint32_t *indices = malloc((size_t)mesh->triangle_count * 12 + 1);
+    lathe_status status = positions && normals && indices ? LATHE_OK : LATHE_ERR_MEMORY;
+    if (!status) {
+        lathe_mesh_positions(mesh, transform, positions);
+        lathe_mesh_indices(mesh, transform, indices);
+        add_normals(normals, positions, indices, mesh->triangle_count);
+        make_unit(normals, mesh->vertex_count);
+    }
+    free(positions);
+    free(normals);
+    free(indices);
+    return status;
+}
+
 /* What to do with the last meshes, once they are built. */
-typedef enum hashing { HASH_NONE, HASH_ALL, HASH_EACH } hashing;
+typedef enum hashing { HASH_NONE, HASH_ALL, HASH_EACH, DRESS } hashing;   /* DRESS: positions in mm, indices, normals */
 
 static lathe_status last_meshes(lathe_decoder *decoder, hashing hash, decode_result *result) {
     uint32_t count = lathe_decoder_structures(decoder);
@@ -58,6 +95,7 @@ static lathe_status last_meshes(lathe_decoder *decoder, hashing hash, decode_res
         result->last_triangles += mesh->triangle_count;
         result->vertices += mesh->vertex_count;
         if (hash == HASH_ALL) result->hash = lathe__hash_mesh(result->hash, mesh);
+        if (hash == DRESS && dress_mesh(mesh, lathe_decoder_transform(decoder, i))) return LATHE_ERR_MEMORY;
         if (hash == HASH_EACH) printf("%016llx\n", (unsigned long long)lathe__hash_mesh(LATHE_FNV_START, mesh));
     }
     return LATHE_OK;
@@ -67,7 +105,7 @@ static lathe_status decode_once(decode_result *out, const uint8_t *stream, size_
                                 lathe_error *err) {
     decode_result result;
     memset(&result, 0, sizeof result);
-    double start = cpu_seconds();
+    double start = lathe__cpu_seconds();
     lathe_decoder *decoder = NULL;
     lathe_status status = lathe_decoder_open(&decoder);
     if (status) return status;
@@ -76,7 +114,7 @@ static lathe_status decode_once(decode_result *out, const uint8_t *stream, size_
     if (!status) status = step_through(decoder, all_levels, &result);
     if (!status) status = last_meshes(decoder, hash, &result);
     if (status) lathe_fail(err, status, "%s", lathe_decoder_error(decoder));
-    result.seconds = cpu_seconds() - start;
+    result.seconds = lathe__cpu_seconds() - start;
     lathe_decoder_close(&decoder);
     if (!status) *out = result;
     return status;
@@ -105,6 +143,21 @@ static lathe_status measure(decode_result *last, decode_result *all, const lathe
     return status;
 }
 
+lathe_status lathe__measure_decoding(lathe__decode_speed *out, const lathe_model *model, int repeats, lathe_error *err) {
+    size_t size;
+    const uint8_t *stream = lathe__whole_stream(model, &size);
+    for (int i = 0; i < repeats; i++) {
+        decode_result plain, dressed;
+        lathe_status status = decode_once(&plain, stream, size, false, HASH_NONE, err);
+        if (!status) status = decode_once(&dressed, stream, size, false, DRESS, err);
+        if (status) return status;
+        out->triangles = plain.last_triangles;
+        if (i == 0 || plain.seconds < out->seconds) out->seconds = plain.seconds;
+        if (i == 0 || dressed.seconds < out->with_normals) out->with_normals = dressed.seconds;
+    }
+    return LATHE_OK;
+}
+
 static double per_second(uint64_t triangles, double seconds) { return seconds > 0 ? (double)triangles / seconds : 0; }
 
 static void print_speed(const decode_result *last, const decode_result *all, bool json) {
@@ -125,12 +178,13 @@ static void print_speed(const decode_result *last, const decode_result *all, boo
 
 static int run_bench(int argc, char **argv) {
     const lathe_command *command = &lathe__command_bench;
+    if (argc > 1 && strcmp(argv[1], "bytes") == 0) return lathe__bench_bytes(argc, argv);
     bool json = false;
     const char *repeat = NULL;
     const lathe_option options[] = {LATHE_OPTION_FLAG("json", &json, true), LATHE_OPTION_TEXT("repeat", 'r', &repeat)};
     int count, status = lathe__parse_options(command, argc, argv, options, 2, &count);
     if (status != LATHE_PARSED) return status;
-    if (count != 2 || strcmp(argv[1], "decode") != 0) return lathe__usage_error(command, "`decode FILE` is needed");
+    if (count != 2 || strcmp(argv[1], "decode") != 0) return lathe__usage_error(command, "`decode FILE` or `bytes FILE` is needed");
     int64_t repeats = 5;
     if (repeat && !lathe__option_integer(&repeats, repeat, 1, 1000)) return lathe__usage_error(command, "--repeat %s: 1 to 1000", repeat);
     lathe_model *model = NULL;
@@ -166,10 +220,15 @@ static int run_hash(int argc, char **argv) {
 }
 
 const lathe_command lathe__command_bench = {
-    "bench", "measure how fast an archive decodes",
-    "Usage: lathe bench decode FILE [--repeat N] [--json]\n\n"
+    "bench", "measure how fast an archive decodes and what its levels cost",
+    "Usage: lathe bench decode FILE [--repeat N] [--json]\n"
+    "       lathe bench bytes FILE|VOLUME [bake options] [--repeat N] [--meshes DIR] [-o OUT.lathe] [--json]\n\n"
     "Decodes FILE (.lathe) to meshes, joints included, N times (5), and prints the CPU time of the fastest run: once with\n"
-    "only the last level's meshes built, once with those of every level; and the hash of the last meshes.\n",
+    "only the last level's meshes built, once with those of every level; and the hash of the last meshes.\n\n"
+    "bytes: for each level of FILE (.lathe) the bytes of its packets, of what is fetched with them, of the level in Draco, and its\n"
+    "two-sided RMS and largest error in voxels. A VOLUME is baked first, and the CPU time of each stage of the bake printed; the\n"
+    "options are those of `lathe bake`. --meshes DIR writes each level's mesh there. --json also lists every packet.\n"
+    "`make bench-bytes` compares with other coders.\n",
     run_bench};
 
 const lathe_command lathe__command_hash = {

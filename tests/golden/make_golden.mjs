@@ -70,10 +70,10 @@ mkdirSync(folder, { recursive: true });
 const rough = foam(5), fine = foam(3);
 const blob = (x, y, z) => ball(x - 19, y - 18, z - 16, 13) / 8 + 1.5 * rough(x, y, z) + 0.5 * fine(x, y, z);
 const label = (x, y, z) => {
-    if (ball(x - 10, y - 10, z - 10, 7.5) > 0) return 1;                        /* becomes a radius map */
-    if (Math.abs(Math.hypot(x - 30, z - 14) - 8) < 3 && Math.abs(y - 12) < 4) return 2;
-    if (y > 20 && rough(x, y, z) + fine(x, y, z) > 0.5) return 3;                              /* many components */
-    return x > 40 && y < 6 && z > 4 && z < 9 ? 7 : 0;                           /* a small box */
+    if (ball(x - 13, y - 12, z - 15, 11.5) > 0) return 1;                       /* becomes a radius map */
+    if (Math.abs(Math.hypot(x - 38, z - 14) - 8) < 3 && Math.abs(y - 12) < 4) return 2;
+    if (y > 25 && rough(x, y, z) + fine(x, y, z) > 0.5) return 3;               /* many components */
+    return x > 48 && y < 6 && z > 4 && z < 9 ? 7 : 0;                           /* a small box */
 };
 const cone = (x, y, z) => 13 + 3 * Math.cos(3 * (Math.atan2(y - 19, x - 18 - z / 30) - z / 12)) - Math.hypot(y - 19, x - 18 - z / 30) - ((z - 16) / 9) ** 2;
 
@@ -83,9 +83,9 @@ bake('keep', raw('keep', [26, 25, 22], (x, y, z) => ball(x - 13, y - 12, z - 11,
 bake('keep_stars', raw('keep_stars', [30, 24, 28], (x, y, z) => ball(x - 13, y - 12, (z - 14) * 0.8, 9) + rough(x, y, z)), '--iso', '0', '--topology', 'keep');
 bake('radius', raw('radius', [30, 30, 30], (x, y, z) => ball(x - 14.5, y - 15, z - 15.2, 12)), '--iso', '0');
 bake('twisted', raw('twisted', [36, 38, 33], cone), '--iso', '0');
-bake('shared', raw('shared', [48, 32, 26], label), '--labels', 'all');
-bake('independent', raw('independent', [48, 32, 26], label, [1, 1, 1.5]), '--labels', 'all', '--independent');
-bake('keep_labels', raw('keep_labels', [48, 32, 26], label), '--labels', 'all', '--topology', 'keep', '--axis', 'x');
+bake('shared', raw('shared', [56, 37, 29], label), '--labels', 'all');
+bake('independent', raw('independent', [56, 37, 29], label, [1, 1, 1.5]), '--labels', 'all', '--independent');
+bake('keep_labels', raw('keep_labels', [56, 37, 29], label), '--labels', 'all', '--topology', 'keep', '--axis', 'x');
 /* Turned, sheared by its spacing, mirrored. */
 const tilt = [[-0.8, 0.45, 0.3, 12.5], [0.36, 1.1, -0.7, -40], [-0.12, 0.2, 2.3, 7.25]];
 bake('oblique', nifti('oblique', [40, 37, 33], (x, y, z) => 100 + 60 * blob(x, y, z), tilt), '--iso', '100');

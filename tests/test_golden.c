@@ -1,0 +1,407 @@
+/* Golden streams: what is in tests/golden decodes to what it always did, packet by packet and mesh by mesh; cut short it waits for
+ * more, damaged it is refused by name.
+ *
+ *   test_golden                    compares with tests/golden/packets.txt and tests/golden/meshes.txt
+ *   test_golden --write packets    writes packets.txt anew: only after streams were added
+ *   test_golden --write meshes     writes meshes.txt anew: after a change of the surface that is meant (see docs/FORMAT.md)
+ *
+ * web/test/reference.test.mjs computes packets.txt, too, with the second decoder. LATHE_GOLDEN names another folder. */
+#include <dirent.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "lathe_codec.h"
+#include "restream.h"
+
+static const char *folder(void) {
+    const char *given = getenv("LATHE_GOLDEN");
+    return given ? given : "tests/golden";
+}
+
+/* ---- files ---- */
+
+typedef struct file { uint8_t *bytes; size_t size; } file;
+
+/* Exactly as long as the file, so that a sanitizer sees a read too far; NULL if there is none. */
+static file read_file(const char *name) {
+    char path[600];
+    file f = {NULL, 0};
+    snprintf(path, sizeof path, "%s/%s", folder(), name);
+    FILE *in = fopen(path, "rb");
+    if (!in) return f;
+    if (fseek(in, 0, SEEK_END) || ftell(in) < 0) abort();
+    f.size = (size_t)ftell(in);
+    rewind(in);
+    f.bytes = malloc(f.size + !f.size);
+    if (!f.bytes || fread(f.bytes, 1, f.size, in) != f.size) abort();
+    fclose(in);
+    return f;
+}
+
+static int is_golden(const struct dirent *entry) {
+    const char *dot = strrchr(entry->d_name, '.');
+    return dot && !strcmp(dot, ".lathe");
+}
+
+/* ---- digests: FNV-1a over little-endian words ---- */
+
+typedef struct digest { uint64_t hash; } digest;
+static const digest START = {0xCBF29CE484222325u};
+
+static void add_byte(digest *d, uint8_t byte) { d->hash = (d->hash ^ byte) * 0x100000001B3u; }
+static void add(digest *d, uint32_t word) {
+    for (int i = 0; i < 4; i++) add_byte(d, (uint8_t)(word >> 8 * i));
+}
+static void add64(digest *d, uint64_t v) { add(d, (uint32_t)v), add(d, (uint32_t)(v >> 32)); }
+static void add_float(digest *d, float v) {
+    uint32_t bits;
+    memcpy(&bits, &v, sizeof bits);
+    add(d, bits);
+}
+static void add_double(digest *d, double v) {
+    uint64_t bits;
+    memcpy(&bits, &v, sizeof bits);
+    add64(d, bits);
+}
+static void add_text(digest *d, const char *text) {
+    add(d, (uint32_t)strlen(text));
+    for (; *text; text++) add_byte(d, (uint8_t)*text);
+}
+
+static uint64_t header_digest(const lathe_header *h) {
+    digest d = START;
+    add(&d, h->axis), add(&d, h->boundary);
+    for (int i = 0; i < 12; i++) add_double(&d, h->affine[i / 4][i % 4]);
+    add(&d, h->parameter_count);
+    for (uint32_t i = 0; i < h->parameter_count; i++) add(&d, h->parameters[i]);
+    add(&d, h->structure_count);
+    for (uint32_t i = 0; i < h->structure_count; i++) {
+        for (int k = 0; k < 3; k++) add(&d, (uint32_t)h->structures[i].origin[k]), add(&d, (uint32_t)h->structures[i].size[k]);
+        add(&d, h->structures[i].level_count);
+    }
+    return d.hash;
+}
+
+static void add_counts(digest *d, const lathe_level_info *l) {
+    add(d, l->rays), add(d, l->slices), add(d, l->vertices), add(d, l->triangles), add64(d, l->draco_bytes);
+}
+
+static uint64_t footer_digest(const lathe_model_info *info) {
+    digest d = START;
+    add_text(&d, info->name);
+    add_double(&d, info->iso);
+    for (uint32_t l = 0; l < info->level_count; l++) add_counts(&d, &info->levels[l]);
+    for (uint32_t i = 0; i < info->structure_count; i++) {
+        const lathe_structure_info *s = &info->structures[i];
+        add_text(&d, s->name);
+        for (int k = 0; k < 3; k++) add(&d, s->rgb[k]);
+        add64(&d, (uint64_t)s->label);
+        for (uint32_t l = 0; l < s->level_count; l++) {
+            const lathe_level_info *level = &s->levels[l];
+            add_counts(&d, level);
+            add_float(&d, level->error_rms_mm), add_float(&d, level->error_max_mm);
+            add(&d, level->components), add(&d, level->components_waiting);
+            add_float(&d, (float)level->waiting_mm3);
+        }
+    }
+    return d.hash;
+}
+
+static void add_stars(digest *d, const lathe_structure_state *s, const int32_t *slices, uint32_t count) {
+    for (uint32_t i = 0; i < count; i++) {
+        add(d, (uint32_t)slices[i]), add(d, s->base[i].count);
+        for (uint32_t k = 0; k < s->base[i].count; k++) {
+            const lathe_star *star = &s->base[i].stars[k];
+            add(d, star->parent), add(d, star->hole), add(d, star->rays);
+            add(d, (uint32_t)star->centre[0]), add(d, (uint32_t)star->centre[1]);
+            for (uint32_t r = 0; r < star->rays; r++) add(d, star->radius[r]);
+        }
+    }
+}
+
+static void add_slices(digest *d, const lathe_structure_state *s, const int32_t *slices, uint32_t count) {
+    for (uint32_t i = 0; i < count; i++) {
+        const uint64_t *words = lathe__mask_slice(&s->mask, slices[i]);
+        add(d, (uint32_t)slices[i]), add(d, s->finer ? s->finer[i] : 0);
+        for (size_t k = 0; k < lathe__mask_slice_words(&s->mask); k++) add64(d, words[k]);
+    }
+    if (!s->cap_bytes) return;   /* else: where the shapes of the caps begin */
+    add(d, s->cap_code.code), add(d, s->cap_code.range);
+    add(d, (uint32_t)(s->cap_code.end - s->cap_code.at)), add(d, s->cap_code.overrun);
+}
+
+static void add_radii(digest *d, const lathe_structure_state *s) {
+    const lathe_radius_map *m = s->radii;
+    int32_t stride = lathe__level_stride(&s->plan, (uint32_t)s->level), last = m->slices - 1;
+    uint32_t rays = lathe__radius_ray_stride(m, (uint32_t)s->level);
+    add(d, m->rays), add(d, (uint32_t)m->step), add(d, (uint32_t)m->turn), add(d, (uint32_t)m->apex[0]), add(d, (uint32_t)m->apex[1]);
+    for (int32_t row = 0;; row = row + stride < last ? row + stride : last) {
+        add(d, (uint32_t)row), add(d, (uint32_t)m->centre[row][0]), add(d, (uint32_t)m->centre[row][1]);
+        for (uint32_t i = 0; i < m->rays; i += rays) add(d, (uint32_t)m->radius[(size_t)row * m->rays + i]);
+        if (row == last) return;
+    }
+}
+
+/* What the packet of a step said. */
+static uint64_t packet_digest(const char **kind, const lathe_structure_state *s, const lathe_step *step) {
+    digest d = START;
+    lathe_arena arena = {0};
+    int32_t *slices;
+    uint32_t count;
+    if (lathe__level_slices(&slices, &count, &arena, &s->plan, (uint32_t)s->level)) abort();
+    add_float(&d, step->error_rms_mm), add_float(&d, step->error_max_mm);
+    *kind = s->radii ? "radii" : s->base ? "stars" : "slices";
+    if (s->radii) add_radii(&d, s);
+    else if (s->base) add_stars(&d, s, slices, count);
+    else add_slices(&d, s, slices, count);
+    lathe__arena_free(&arena);
+    return d.hash;
+}
+
+static uint64_t mesh_digest(const lathe_mesh *mesh) {
+    digest d = START;
+    for (uint32_t i = 0; i < mesh->vertex_count * 3; i++) add(&d, (uint32_t)mesh->lattice[i / 3][i % 3]);
+    for (uint32_t i = 0; i < mesh->triangle_count * 3; i++) add(&d, mesh->triangles[i / 3][i % 3]);
+    return d.hash;
+}
+
+/* ---- where the records of an archive are ---- */
+
+enum { MOST_PACKETS = 256 };
+typedef struct packet { size_t begin, end; uint32_t level, structure; } packet;
+typedef struct records {
+    size_t header, stream;     /* bytes of both */
+    packet packets[MOST_PACKETS];
+    uint32_t count;
+} records;
+
+static lathe_header find_records(records *out, const file *f) {
+    lathe_reader trailer = lathe__reader(f->bytes + f->size - LATHE_TRAILER_SIZE, LATHE_TRAILER_SIZE);
+    *out = (records){.stream = (size_t)lathe__read_u64(&trailer)};
+    lathe_reader reader = lathe__reader(f->bytes, out->stream);
+    lathe_header header;
+    if (lathe__header_parse(&header, &reader)) abort();
+    out->header = (size_t)(reader.at - f->bytes);
+    for (uint32_t level = 0; level < header.level_count; level++) {
+        lathe_level_head head;
+        if (lathe__level_parse(&head, &reader, &header)) abort();
+        for (uint32_t i = 0, packet_of = 0; i < header.structure_count; i++) {
+            if (header.structures[i].level_count <= level) continue;
+            size_t begin = (size_t)(reader.at - f->bytes);
+            if (out->count == MOST_PACKETS || !lathe__packet_parse(&reader, head.sizes[packet_of++])) abort();
+            out->packets[out->count++] = (packet){begin, (size_t)(reader.at - f->bytes), level, i};
+        }
+        lathe__level_head_free(&head);
+    }
+    return header;
+}
+
+/* ---- what the streams decode to ---- */
+
+static void decode(FILE *packets, FILE *meshes, const char *name, const file *f) {
+    records r;
+    lathe_header header = find_records(&r, f);
+    fprintf(packets, "%s header %016llx\n", name, (unsigned long long)header_digest(&header));
+    lathe__header_free(&header);
+    lathe_decoder *decoder;
+    lathe_step step;
+    if (lathe_decoder_open(&decoder) || lathe_decoder_feed(decoder, f->bytes, r.stream)) abort();
+    lathe_status status;
+    uint32_t steps = 0;
+    while (!(status = lathe_decoder_step(decoder, &step))) {
+        const char *kind;
+        uint64_t digest = packet_digest(&kind, lathe__decoder_state(decoder, step.structure), &step);
+        fprintf(packets, "%s %u %u %s %016llx\n", name, step.level, step.structure, kind, (unsigned long long)digest);
+        const lathe_mesh *mesh = lathe_decoder_mesh(decoder, step.structure);
+        if (!CHECK(mesh != NULL)) break;
+        fprintf(meshes, "%s %u %u %u %u %016llx\n", name, step.level, step.structure, mesh->vertex_count, mesh->triangle_count,
+                (unsigned long long)mesh_digest(mesh));
+        CHECK(steps < r.count && step.level == r.packets[steps].level && step.structure == r.packets[steps].structure);
+        steps++;
+    }
+    if (!CHECK(status == LATHE_MORE)) fprintf(stderr, "%s: %s\n", name, lathe_decoder_error(decoder));
+    CHECK_EQ(steps, r.count);
+    lathe_decoder_close(&decoder);
+    lathe_model *model;
+    lathe_error err = {""};
+    if (!CHECK(!lathe_model_parse(&model, f->bytes, f->size, &err))) return;
+    CHECK(!lathe_model_check(model, &err));
+    fprintf(packets, "%s footer %016llx\n", name, (unsigned long long)footer_digest(lathe_model_describe(model)));
+    lathe_model_close(&model);
+}
+
+/* Line by line; a line too many is a failure, too. */
+static void compare(const char *name, char *computed) {
+    file expected = read_file(name);
+    if (!CHECK(expected.bytes != NULL)) return;
+    char *text = malloc(expected.size + 1), *rest = text, *other = computed, *line;
+    if (!text) abort();
+    memcpy(text, expected.bytes, expected.size);
+    text[expected.size] = 0;
+    while ((line = strsep(&rest, "\n")) != NULL) {
+        const char *now = strsep(&other, "\n");
+        if (!CHECK(now && !strcmp(line, now))) fprintf(stderr, "%s: expected %s\n    got      %s\n", name, line, now ? now : "(nothing)");
+    }
+    CHECK(!other || !*other);
+    free(text);
+    free(expected.bytes);
+}
+
+static void write_anew(const char *name, const char *computed) {
+    char path[600];
+    snprintf(path, sizeof path, "%s/%s", folder(), name);
+    FILE *out = fopen(path, "w");
+    if (!out || fputs(computed, out) == EOF || fclose(out)) {
+        perror(path);
+        exit(1);
+    }
+    printf("%s written\n", path);
+}
+
+/* ---- cut short ---- */
+
+/* One decoder is fed byte by byte: after each byte it stands where a decoder of that prefix stands. */
+static void every_prefix(const file *f) {
+    records r;
+    lathe_header header = find_records(&r, f);
+    lathe__header_free(&header);
+    lathe_decoder *decoder;
+    lathe_step step;
+    if (lathe_decoder_open(&decoder)) abort();
+    lathe_decoder_build_meshes(decoder, false);
+    CHECK_EQ(lathe_decoder_step(decoder, &step), LATHE_MORE);
+    uint32_t steps = 0, wrong = 0;
+    for (size_t at = 0; at < r.stream; at++) {
+        wrong += lathe_decoder_feed(decoder, f->bytes + at, 1) != LATHE_OK;
+        bool complete = steps < r.count && at + 1 == r.packets[steps].end;
+        wrong += lathe_decoder_step(decoder, &step) != (complete ? LATHE_OK : LATHE_MORE);
+        steps += complete;
+        if (complete) wrong += lathe_decoder_step(decoder, &step) != LATHE_MORE;
+    }
+    CHECK_EQ(wrong, 0);
+    CHECK_EQ(steps, r.count);
+    CHECK(!*lathe_decoder_error(decoder));
+    lathe_decoder_close(&decoder);
+}
+
+static void every_short_archive(const file *f) {
+    uint32_t wrong = 0;
+    for (size_t size = 0; size < f->size; size++) {
+        uint8_t *copy = malloc(size + !size);
+        if (!copy) abort();
+        memcpy(copy, f->bytes, size);
+        lathe_model *model;
+        lathe_error err = {""};
+        wrong += lathe_model_parse(&model, copy, size, &err) != LATHE_ERR_FORMAT || !err.text[0];
+        free(copy);
+    }
+    CHECK_EQ(wrong, 0);
+}
+
+/* ---- damaged ---- */
+
+/* The message about a damaged byte tells where it is: a packet by level and structure, else the record or the byte. */
+static bool named(const records *r, const lathe_model_info *info, size_t at, const char *text) {
+    for (uint32_t i = 0; i < r->count; i++) {
+        if (at < r->packets[i].begin || at >= r->packets[i].end) continue;
+        char who[160];
+        snprintf(who, sizeof who, "level %u of structure '%s'", r->packets[i].level, info->structures[r->packets[i].structure].name);
+        return strstr(text, who) != NULL;
+    }
+    if (at < LATHE_MAGIC_SIZE) return strstr(text, "not a Lathe archive") || strstr(text, "another version");
+    if (strstr(text, "near byte")) return true;
+    return at >= r->stream && (strstr(text, "footer") || strstr(text, "the archive's end is missing"));
+}
+
+static lathe_status parse_damaged(const uint8_t *bytes, size_t size, lathe_error *err) {
+    lathe_model *model = NULL;
+    lathe_status status = lathe_model_parse(&model, bytes, size, err);
+    if (!status) status = lathe_model_check(model, err);
+    lathe_model_close(&model);
+    return status;
+}
+
+static void every_flipped_bit(const file *f) {
+    records r;
+    lathe_header header = find_records(&r, f);
+    lathe__header_free(&header);
+    lathe_model *model;
+    if (lathe_model_parse(&model, f->bytes, f->size, NULL)) abort();
+    uint32_t unseen = 0, nameless = 0;
+    for (size_t i = 0; i < f->size * 8; i++) {
+        lathe_error err = {""};
+        f->bytes[i / 8] ^= (uint8_t)(1 << i % 8);
+        lathe_status status = parse_damaged(f->bytes, f->size, &err);
+        f->bytes[i / 8] ^= (uint8_t)(1 << i % 8);
+        unseen += status != LATHE_ERR_FORMAT && status != LATHE_ERR_CHECKSUM && status != LATHE_ERR_UNSUPPORTED && status != LATHE_ERR_LIMIT;
+        if (named(&r, lathe_model_describe(model), i / 8, err.text)) continue;
+        if (!nameless++) fprintf(stderr, "byte %zu: %s\n", i / 8, err.text);
+    }
+    CHECK_EQ(unseen, 0);
+    CHECK_EQ(nameless, 0);
+    lathe_model_close(&model);
+}
+
+/* A decoder never gets past the damaged record. A size that has grown makes it wait. */
+static void flipped_streams(const file *f) {
+    enum { EVERY = 37 };
+    records r;
+    lathe_header header = find_records(&r, f);
+    lathe__header_free(&header);
+    for (size_t at = 0; at < r.stream; at += EVERY) {
+        uint32_t before = 0, steps = 0;
+        while (before < r.count && r.packets[before].end <= at) before++;
+        lathe_decoder *decoder;
+        lathe_step step;
+        if (lathe_decoder_open(&decoder)) abort();
+        lathe_decoder_build_meshes(decoder, false);
+        f->bytes[at] ^= (uint8_t)(1 << at % 8);
+        if (lathe_decoder_feed(decoder, f->bytes, r.stream)) abort();
+        f->bytes[at] ^= (uint8_t)(1 << at % 8);
+        lathe_status status;
+        while (!(status = lathe_decoder_step(decoder, &step))) steps++;
+        CHECK_EQ(steps, before);
+        CHECK(status == LATHE_MORE || *lathe_decoder_error(decoder));
+        if (before < r.count && at >= r.packets[before].begin) CHECK_EQ(status, LATHE_ERR_CHECKSUM);
+        lathe_decoder_close(&decoder);
+    }
+}
+
+int main(int argc, char **argv) {
+    const char *anew = argc == 3 && !strcmp(argv[1], "--write") ? argv[2] : NULL;
+    char *text[2];
+    size_t size[2];
+    FILE *packets = open_memstream(&text[0], &size[0]), *meshes = open_memstream(&text[1], &size[1]);
+    struct dirent **entries;
+    int count = scandir(folder(), &entries, is_golden, alphasort);
+    if (!packets || !meshes) abort();
+    CHECK(count >= 12);
+    for (int i = 0; i < count; i++) {
+        char name[300];
+        file f = read_file(entries[i]->d_name);
+        snprintf(name, sizeof name, "%.*s", (int)strlen(entries[i]->d_name) - 6, entries[i]->d_name);
+        CHECK(f.size > 0 && f.size <= 8192);
+        decode(packets, meshes, name, &f);
+        if (!anew) {
+            every_prefix(&f);
+            every_short_archive(&f);
+            every_flipped_bit(&f);
+            flipped_streams(&f);
+        }
+        free(f.bytes);
+        free(entries[i]);
+    }
+    if (count >= 0) free(entries);
+    if (fclose(packets) || fclose(meshes)) abort();
+    if (!anew) {
+        compare("packets.txt", text[0]);
+        compare("meshes.txt", text[1]);
+    } else if (!strcmp(anew, "packets")) {
+        write_anew("packets.txt", text[0]);
+    } else if (!strcmp(anew, "meshes")) {
+        write_anew("meshes.txt", text[1]);
+    }
+    free(text[0]);
+    free(text[1]);
+    return check_end();
+}
