@@ -46,7 +46,7 @@ static lathe_status measure(timing *out, lathe_arena *scratch, const lathe_ray_c
 int main(void) {
     lathe_arena arena = {0}, scratch = {0};
     lathe_status status = LATHE_OK;
-    puts("| crossings | parse, ns each | left and right trees, ns each | tile, ns each |\n| --- | --- | --- | --- |");
+    puts("## Min and Lee 2003: parsing and tiling are linear\n\nOne folded contour against another, CPU nanoseconds for each crossing; the counts of work for each crossing are asserted in\ntests/test_derivation.c.\n\n| crossings | parse, ns each | left and right trees, ns each | tile, ns each |\n| --- | --- | --- | --- |");
     for (uint32_t n = 1000; n <= 1000000 && !status; n *= 10) {
         lathe_ray_contour a, b;
         timing t;
