@@ -15,9 +15,9 @@ typedef struct lathe_star {
 } lathe_star;
 typedef struct lathe_star_slice { uint32_t count; lathe_star *stars; } lathe_star_slice;
 
-/* A radius step in lattice units: a quarter of the slice distance, at least one voxel. */
+/* A radius step in lattice units: three eighths of the slice distance, at least one voxel. */
 static inline int32_t lathe__radius_step(int32_t stride) {
-    return stride < 4 ? LATHE_LATTICE_ONE : stride * (LATHE_LATTICE_ONE / 4);
+    return stride < 4 ? LATHE_LATTICE_ONE : stride * (LATHE_LATTICE_ONE / 8 * 3);
 }
 /* The polygons of a slice's stars, as encoder and decoder both see them. Points get arena memory. */
 lathe_status lathe__star_outline(lathe_outline *out, lathe_arena *arena, const lathe_star_slice *slice, int32_t step, uint32_t seed);

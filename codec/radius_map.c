@@ -15,8 +15,8 @@ lathe_status lathe__radius_map_start(lathe_radius_map *map, lathe_arena *arena) 
     size_t samples = (size_t)map->slices * map->rays;
     if (samples > (size_t)1 << 24) return LATHE_ERR_LIMIT;
     map->centre = lathe__arena_alloc(arena, (size_t)map->slices, sizeof *map->centre);
+    map->left = LATHE_NEW(arena, int8_t, samples);   /* before the larger array: blocks of an arena at least double */
     map->radius = LATHE_NEW(arena, int32_t, samples);
-    map->left = LATHE_NEW(arena, int8_t, samples);
     if (!map->centre || !map->radius || !map->left) return LATHE_ERR_MEMORY;
     memset(map->left, 0, samples);
     start_model(&map->centres, 24, 77);

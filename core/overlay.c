@@ -386,6 +386,13 @@ static bool turns_right(const overlay *o, const cycle *c) {
     return area < 0;
 }
 
+/* Does edge f, where it crosses e, go on upwards to the right of it? */
+static bool passes_right(const overlay *o, uint32_t e, uint32_t f) {
+    lathe_point a = o->at[e], b = o->at[o->next[e]], c = o->at[f], d = o->at[o->next[f]];
+    int64_t turn = (int64_t)(b.x - a.x) * (d.y - c.y) - (int64_t)(b.y - a.y) * (d.x - c.x);
+    return d.y != c.y && (turn < 0) == ((b.y < a.y) == (d.y < c.y));
+}
+
 /* The cycle that a hole shares its cell with: the one that bounds the sub-edge to its left. */
 static uint32_t left_of_hole(const overlay *o, const cycle *c) {
     uint32_t leftmost = NONE;
@@ -395,6 +402,13 @@ static uint32_t left_of_hole(const overlay *o, const cycle *c) {
     }
     uint32_t edge = leftmost == NONE ? NONE : nearest_left(o, leftmost, 3);
     if (edge == NONE) return NONE;
+    /* At the very height of a meeting rounding hides which edge comes first: above it, the one to the right. */
+    for (uint32_t i = o->first[edge]; i < o->first[edge + 1]; i++) {
+        uint32_t other = o->meetings[o->on[i]].edge[!side_of(o, edge)];
+        if (o->at[o->vertices + o->on[i]].y != o->at[leftmost].y || !passes_right(o, edge, other)) continue;
+        edge = other;
+        break;
+    }
     bool down = goes_down(o, edge);
     uint32_t sub = edge + o->first[edge];
     for (uint32_t i = o->first[edge]; i < o->first[edge + 1]; i++)

@@ -125,14 +125,15 @@ static void known_shapes(void) {
     lathe__mask_free(&m);
 }
 
-/* Pairs that gave flaws before outlines kept room and holes had bridges that are seen, and as many others as `make test` has time
- * for; `make soak` goes on. */
+/* Pairs that gave flaws before outlines kept room and holes had bridges that are seen, and 10,000 others, by turns exact and
+ * coarse; `make soak` takes both of a million. */
 static void random_pairs(void) {
-    static const uint64_t known[] = {17510, 54196, 1015036, 1017798, 1122693, 1132265, 1134630};
+    static const uint64_t known[] = {17510, 54196, 1015036, 1017798, 1122693, 1132265, 1134630, 1171767};
     for (uint64_t i = 0; i < 10000 + sizeof known / sizeof *known; i++) {
         uint64_t number = i < 10000 ? i : known[i - 10000];
         slice_pair p = pair_draw(number, 1);
         for (int exact = 0; exact < 2; exact++) {
+            if (i < 10000 && (i / PAIR_KINDS + (uint64_t)exact) % 2) continue;
             const char *fault = pair_fault(&p, arena, exact);
             if (!CHECK(!*fault)) fprintf(stderr, "  pair %llu (%s), %s: the surface %s\n", (unsigned long long)number, pair_kind_name[p.kind],
                                          exact ? "exact" : "coarse", fault);
@@ -145,7 +146,7 @@ static void random_pairs(void) {
 int main(void) {
     known_shapes();
     random_pairs();
-    for (int i = 0; i < 4000; i++) {
+    for (int i = 0; i < 1500; i++) {
         lathe_mask m;
         char what[96];
         int size = 2 + (int)(next_random() % 12), slices = 1 + (int)(next_random() % 5), density = 10 + (int)(next_random() % 80);

@@ -236,7 +236,7 @@ test('a stream cut short is taken up where it broke', async () => {
     const body = Buffer.from(await (await fetch(server.url + '/models/shapes/stream?from=1')).arrayBuffer());
     let tries = 0;
     const page = await open('/m/shapes', {
-        route: (route) => route.fulfill({ body: tries++ ? body : body.subarray(0, body.length >> 1) }),
+        route: (route) => route.fulfill({ body: tries++ ? body : body.subarray(0, body.length >> 2) }),
     });
     await state(page, 'error');
     const half = await data(page);

@@ -1,0 +1,380 @@
+#!/usr/bin/python3
+"""Bytes over error: Lathe's stream against what somebody would send instead, on the same volumes, in the same run.
+
+  bytes.py [--lathe build/lathe] [--wasm build/wasm/lathe.wasm] [--tools build/release/tests/bench/peers] [--volumes NAME,...]
+           [--volume FILE [--iso V]] [--quick] [--json FILE] [--markdown FILE] [--plots DIR] [--strict]
+
+Errors are two-sided RMS in voxels against a reference surface, the worse direction, measured by VTK. Bytes of Lathe are all that a
+client has fetched when it stands at the error: header, heads of level records, packets, checksums. It may stop after any packet.
+Peers: Lindstrom-Turk (CGAL) and quadric (VTK) decimation, each mesh under Draco and under meshoptimizer + zstd at every sensible
+quantisation; the fewest bytes at no greater error count. Their levels summed: separate meshes of falling error, one after the other.
+The voxel mask under a mixed 3D context model. `make bench-bytes` builds the tools and runs this.
+"""
+import argparse, json, math, os, subprocess, sys, tempfile, time
+from multiprocessing import get_context
+import numpy as np
+import bytes_distance as distance
+import bench, bytes_peers as peers, bytes_plot as plot, bytes_volumes as volumes
+
+TARGETS = (1.0, 0.5, 0.25)
+FINE = 0.25
+CURVE_PARTS = 4              # places within a level record where the curve is measured, when it has more packets than one
+BITS_FINEST = 0.1
+MOST_WASM = 12 * 1024
+
+
+class Effort:
+    """How closely to look"""
+    def __init__(self, quick):
+        self.samples = 40_000 if quick else 100_000        # points on each surface, for Lathe
+        self.peer_samples = 12_000 if quick else 20_000    # for each of the many peers
+        self.step = 0.5 if quick else 0.74                 # from one decimated mesh to the next
+        self.quadric = not quick
+        self.names = ("ch2bet", "torso", "xcolumn", "head", "thalamus") if quick else volumes.NAMES
+        self.processes = min(4, os.cpu_count() or 1)
+
+
+# ---- Lathe's stream -------------------------------------------------------------------------------------------------------
+
+
+class Stream:
+    """What `lathe bench bytes` tells, and the meshes that a client has after each packet"""
+    def __init__(self, volume, lathe, folder, repeats):
+        self.archive = os.path.join(folder, "stream.lathe")
+        command = [lathe, "bench", "bytes", volume.path, *volume.options, "--json", "--meshes", folder, "-o", self.archive, "--repeat", str(repeats)]
+        self.report = json.loads(bench.output(command))
+        self.levels, self.packets = self.report["levels"], self.report["packets"]
+        self.folder, self.meshes = folder, {}
+        self.ends = [i for i, p in enumerate(self.packets) if i + 1 == len(self.packets) or self.packets[i + 1][0] != p[0]]
+
+    def level(self, n):
+        """(points, triangles) of each structure, and [first, end) of its vertices and triangles"""
+        if n not in self.meshes:
+            points, triangles, parts = distance.read_mesh(os.path.join(self.folder, f"level{n}.mesh"))
+            ends = np.cumsum(parts.reshape(-1, 2).astype(int), axis=0)
+            self.meshes[n] = points, triangles, np.vstack([[0, 0], ends])
+        return self.meshes[n]
+
+    def part(self, n, structure):
+        points, triangles, ends = self.level(n)
+        (v0, t0), (v1, t1) = ends[structure], ends[structure + 1]
+        return points[v0:v1], triangles[t0:t1].astype(np.int64) - v0
+
+    def mesh(self, packet):
+        """What is there after a packet: structures whose packet of the level has come stand at it, the others one below"""
+        level, structure = self.packets[packet][:2]
+        if packet in self.ends: return self.level(level)[:2]
+        count = len(self.level(level)[2]) - 1
+        shown = [(level if s <= structure else level - 1, s) for s in range(count)]
+        parts = [self.part(n, s) for n, s in shown if n >= 0]
+        starts = np.cumsum([0] + [len(p) for p, _ in parts])
+        return np.concatenate([p for p, _ in parts]), np.concatenate([t + at for (_, t), at in zip(parts, starts)])
+
+    def bytes(self, packet): return self.packets[packet][3]
+    def payload(self, packet): return sum(p[2] for p in self.packets[:packet + 1])
+
+
+class Curve:
+    """A stream's error after its packets, measured when it is asked for"""
+    def __init__(self, stream, reference, samples):
+        self.stream, self.reference, self.samples, self.errors = stream, reference, samples, {}
+
+    def error(self, packet):
+        if packet not in self.errors: self.errors[packet] = self.reference.error(*self.stream.mesh(packet), self.samples)
+        return self.errors[packet]
+
+    def measure(self, processes):
+        """The ends of all levels, and some places between"""
+        places, first = set(self.stream.ends), 0
+        for end in self.stream.ends:
+            places |= {first + (end - first) * i // CURVE_PARTS for i in range(1, CURVE_PARTS)} if end > first else set()
+            first = end + 1
+        self.reference.sample(self.samples)
+        peers.state["curve"] = self
+        with get_context("fork").Pool(processes) as pool: self.errors.update(pool.map(measure_place, sorted(places), 1))
+
+    def reach(self, target):
+        """The first packet found after which the RMS is at most target; its own error is what counts. None: never"""
+        known = sorted(self.errors)
+        good = next((p for p in known if self.errors[p]["rms"] <= target), None)
+        if good is None: return None
+        bad = max((p for p in known if p < good), default=-1)
+        while good - bad > 1:
+            middle = (good + bad) // 2
+            if self.error(middle)["rms"] <= target: good = middle
+            else: bad = middle
+        return good
+
+    def points(self): return [(self.errors[p]["rms"], self.stream.bytes(p)) for p in sorted(self.errors)]
+
+
+def measure_place(packet): return packet, peers.state["curve"].error(packet)
+
+
+# ---- one volume -----------------------------------------------------------------------------------------------------------
+
+
+def wasm_ratio(archive, lathe, wasm, runs):
+    """CPU time of the viewer's decoder over that of the native one: the better of three turns each, one after the other"""
+    native, browser = [], []
+    for _ in range(3):
+        native.append(json.loads(bench.output([lathe, "bench", "decode", archive, "--json", "--repeat", str(runs)]))["seconds"])
+        found = json.loads(bench.output(["node", os.path.join(bench.HERE, "decode_wasm.mjs"), archive, wasm, str(runs)]))
+        browser.append(found["seconds"])
+    return min(browser) / min(native)
+
+
+def measure(name, volume, arguments, effort, folder):
+    started = time.time()
+    small = volume.kind != "folded"
+    reference = distance.Reference(volume.reference(), volume.voxel)
+    stream = Stream(volume, arguments.lathe, folder, 300 if small else 3)
+    curve = Curve(stream, reference, effort.samples)
+    curve.measure(effort.processes)
+    reached = {target: curve.reach(target) for target in TARGETS}
+    first = 0.55 if reference.surface.GetNumberOfPolys() > 1_000_000 else 1
+    rows = peers.sweep(reference, arguments.tools, folder, effort.peer_samples, effort.step, first, effort.quadric, effort.processes)
+    result = {"kind": volume.kind, "voxel_mm": volume.voxel, "reference_triangles": reference.surface.GetNumberOfPolys(),
+              "levels": stream.levels, "decode": stream.report["decode"], "bake_cpu_seconds": stream.report["bake_cpu_seconds"]}
+    for level, end in zip(result["levels"], stream.ends):
+        level.update(stream_bytes=stream.bytes(end), vtk=curve.error(end))
+    result["stream"] = [{"packet": p, "level": stream.packets[p][0], "bytes": stream.bytes(p), "payload": stream.payload(p), **e}
+                        for p, e in sorted(curve.errors.items())]
+    result["reached"] = {t: next(s for s in result["stream"] if s["packet"] == p) if p is not None else None for t, p in reached.items()}
+    result["peers"] = sorted(rows, key=lambda r: r["bytes"])
+    result["best_peer"] = {t: peers.smallest(rows, t) for t in TARGETS}
+    result["mask"] = peers.mask(volume, reference, arguments.tools, folder, effort.samples)
+    result["wasm_ratio"] = wasm_ratio(stream.archive, arguments.lathe, arguments.wasm, 100 if small else 4)
+    result["curves"] = curves(curve.points(), rows, result["mask"])
+    result["seconds"] = round(time.time() - started, 1)
+    return result
+
+
+def curves(own, rows, mask):
+    every = {"Lathe's stream": own, "best decimation + Draco": peers.envelope(rows, "Draco"),
+             "its levels summed": peers.levels_summed(rows), "quadric decimation + Draco": peers.envelope(rows, "quadric + Draco"),
+             "best decimation + meshoptimizer + zstd": peers.envelope(rows, "meshopt"),
+             "voxel mask, 3D contexts (fresh model each)": [(mask["rms"], mask["apart"])]}
+    if mask["together"] < mask["apart"]: every["voxel masks, one model for all"] = [(mask["rms"], mask["together"])]
+    return {name: points for name, points in every.items() if points}
+
+
+# ---- tables ---------------------------------------------------------------------------------------------------------------
+
+
+def grid(head, rows):
+    """Lines of text in columns, as Markdown reads them, too"""
+    cells = [head] + [[str(c) for c in row] for row in rows]
+    wide = [max(len(row[i]) for row in cells) for i in range(len(head))]
+    lines = ["| " + " | ".join(c.ljust(w) if i == 0 else c.rjust(w) for i, (c, w) in enumerate(zip(row, wide))) + " |" for row in cells]
+    lines.insert(1, "| " + " | ".join("-" * w if i == 0 else "-" * (w - 1) + ":" for i, w in enumerate(wide)) + " |")
+    return lines
+
+
+def or_dash(value, form=",.0f"): return "-" if value is None else f"{value:{form}}"
+
+
+def level_table(r):
+    head = ["level", "polar B", "with headers", "stream B", "Draco delta B", "whole in Draco B", "triangles", "bit/new vertex", "RMS", "max"]
+    return grid(head, [[l["level"], f"{l['payload']:,}", f"{l['fetched']:,}", f"{l['stream_bytes']:,}", or_dash(l["draco_delta"]), f"{l['draco']:,}",
+                        f"{l['triangles']:,}", or_dash(l["bits_per_new_vertex"], ".3f"), f"{l['vtk']['rms']:.3f}", f"{l['vtk']['max']:.2f}"]
+                       for l in r["levels"]])
+
+
+def row_for(what, found):
+    if found is None: return [what, "-", "-", "-"]
+    return [what, f"{found['bytes']:,}", f"{found['rms']:.3f}", f"{found['max']:.2f}"]
+
+
+def error_table(r):
+    rows = []
+    for target in TARGETS:
+        rows.append(row_for(f"Lathe's stream, RMS <= {target:g}", r["reached"][target]))
+        for what, part in (("decimation + Draco", "Draco"), ("quadric + Draco", "quadric + Draco"), ("decimation + meshoptimizer + zstd", "meshopt")):
+            best = peers.smallest(r["peers"], target, part)
+            detail = f" ({best['peer'].split(' +')[0]}, {best['triangles']:,} triangles, {best['bits']} bit)" if best else ""
+            rows.append(row_for(f"{what}{detail}, RMS <= {target:g}", best))
+    summed = [p for p in r["curves"].get("its levels summed", []) if p[0] <= FINE]
+    rows.append(row_for(f"separate meshes in Draco down to RMS <= {FINE:g}, summed", {"bytes": summed[0][1], "rms": summed[0][0], "max": math.nan} if summed else None))
+    mask = r["mask"]
+    rows.append(row_for("voxel mask, fresh model for each", {"bytes": mask["apart"], **{k: mask[k] for k in ("rms", "max")}}))
+    if mask["together"] < mask["apart"]: rows.append(row_for("voxel masks, one model for all", {"bytes": mask["together"], **{k: mask[k] for k in ("rms", "max")}}))
+    return grid(["what", "bytes", "RMS", "max"], [[c.replace("nan", "-") for c in row] for row in rows])
+
+
+# ---- the figures of the issue: (what, must, measured, holds or None) ---------------------------------------------------------
+
+
+def against_peer(results, name, targets, limit):
+    r = results.get(name)
+    for target in targets if r else ():
+        own, best = r["reached"][target], r["best_peer"][target]
+        what = f"{name} at {target:g} voxel, against the best mesh peer"
+        if own is None: yield what, f"<= {limit} x", f"RMS {target:g} is not reached", False
+        elif best is None: yield what, f"<= {limit} x", "no peer reaches it", None
+        else: yield what, f"<= {limit} x", f"{own['bytes']:,} / {best['bytes']:,} B = {own['bytes'] / best['bytes']:.2f} x", own["bytes"] <= limit * best["bytes"]
+
+
+def against_mask(results, name):
+    r = results.get(name)
+    if not r: return
+    total, mask = r["levels"][-1]["stream_bytes"], r["mask"]
+    yield f"{name}, finest level, against the 3D-context mask", "<= 1.5 x", f"{total:,} / {mask['apart']:,} B = {total / mask['apart']:.2f} x", total <= 1.5 * mask["apart"]
+    if mask["together"] < mask["apart"]:
+        yield f"{name}, the same, one model for all masks", "", f"{total:,} / {mask['together']:,} B = {total / mask['together']:.2f} x", None
+
+
+def largest_errors(results):
+    found = {n: r["reached"][FINE]["max"] if r["reached"][FINE] else math.inf for n, r in results.items()}
+    yield f"largest error at {FINE:g} RMS, voxels", "<= 1.5", ", ".join(f"{n} {m:.2f}" for n, m in found.items()), max(found.values()) <= 1.5
+
+
+def falling_bits(results):
+    for name, r in results.items():
+        if r["kind"] == "folded": continue
+        bits = [l["bits_per_new_vertex"] for l in r["levels"] if l["bits_per_new_vertex"] is not None]
+        falling = all(a >= b for a, b in zip(bits, bits[1:]))
+        yield f"{name}: bits for each new vertex, coarse to fine", f"falling, <= {BITS_FINEST}", " ".join(f"{b:.3f}" for b in bits), falling and bits[-1] <= BITS_FINEST
+
+
+def star_bytes(results, name, limit):
+    if name not in results: return
+    own = results[name]["reached"][FINE]
+    what = f"{name} at {FINE:g} voxel of its dense polar mesh, packets alone"
+    if own is None: yield what, f"<= {limit} B", f"RMS {FINE:g} is not reached", False
+    else: yield what, f"<= {limit} B", f"{own['payload']:,} B (fetched with headers: {own['bytes']:,} B; RMS {own['rms']:.3f})", own["payload"] <= limit
+
+
+def decode_rows(results):
+    for kind, least in (("smooth", 50), ("folded", 6)):
+        speeds = {n: 1e-6 * r["decode"]["triangles"] / r["decode"]["seconds_with_normals"] for n, r in results.items() if (r["kind"] == "folded") == (kind == "folded")}
+        if speeds: yield f"decode with normals, native, {kind}, M triangles/s", f">= {least}", ", ".join(f"{n} {s:.1f}" for n, s in speeds.items()), min(speeds.values()) >= least
+    ratios = {n: r["wasm_ratio"] for n, r in results.items()}
+    yield "decode, wasm / native", "<= 1.4 x", ", ".join(f"{n} {s:.2f}" for n, s in ratios.items()), max(ratios.values()) <= 1.4
+
+
+def encode_share(results):
+    """Planning tries codings, so it counts as encoding, though it also extracts the region"""
+    found, texts = [], []
+    for name, r in results.items():
+        stages = r["bake_cpu_seconds"]
+        encode = stages.get("planning", 0) + stages.get("encoding", 0)
+        other = sum(stages.values()) - encode
+        found.append(encode / other)
+        texts.append(f"{name} {100 * encode / other:.0f} % ({encode:.2f} / {other:.2f} s; encoding alone {stages.get('encoding', 0):.2f} s)")
+    yield "planning and encoding / other stages of the bake (errors on)", "<= 50 %", ", ".join(texts), max(found) <= 0.5
+
+
+def draco_rows(results):
+    ratios = {}
+    for name, r in results.items():
+        deltas = [l["draco_delta"] for l in r["levels"]]
+        if None not in deltas: ratios[name] = sum(deltas) / r["levels"][-1]["draco"]
+    if ratios: yield "Draco deltas / level N in one Draco", "<= 1.4 x", ", ".join(f"{n} {x:.2f}" for n, x in ratios.items()), max(ratios.values()) <= 1.4
+    else: yield "Draco deltas / level N in one Draco", "<= 1.4 x", "no archive has Draco deltas", False
+
+
+def wasm_size(path):
+    script = "process.stdout.write(String(require('zlib').brotliCompressSync(require('fs').readFileSync(process.argv[1])).length))"
+    return int(bench.output(["node", "-e", script, path]))
+
+
+def figures(results, wasm):
+    yield from against_peer(results, "ch2bet", TARGETS, 1.0)
+    yield from against_peer(results, "aal", (FINE,), 0.6)
+    for name in ("torso", "xcolumn"): yield from against_peer(results, name, (FINE,), 0.5)
+    for name in ("ch2bet", "aal"): yield from against_mask(results, name)
+    yield from largest_errors(results)
+    yield from falling_bits(results)
+    yield from star_bytes(results, "head", 900)
+    yield from star_bytes(results, "thalamus", 130)
+    yield from decode_rows(results)
+    yield from encode_share(results)
+    yield from draco_rows(results)
+    size = wasm_size(wasm)
+    yield "the whole decoder, wasm under brotli", f"<= {MOST_WASM:,} B", f"{size:,} B", size <= MOST_WASM
+
+
+def verdict(holds): return "" if holds is None else "met" if holds else "MISSED"
+
+
+def figure_table(rows): return grid(["what", "must", "measured", ""], [[w, must, got, verdict(h)] for w, must, got, h in rows])
+
+
+# ---- out ------------------------------------------------------------------------------------------------------------------
+
+
+def title(name, r): return f"{name}: bytes over error ({r['kind']}, {r['reference_triangles']:,} triangles in the reference)"
+
+
+def introduction(effort):
+    return [f"Measured by `make bench-bytes` on {bench.machine()}.", "",
+            f"Two-sided errors in voxels, the worse direction, by VTK: {effort.samples:,} points on each surface for Lathe and the mask, "
+            f"{effort.peer_samples:,} for each of the peers. Lathe's bytes are all that has been fetched, headers and checksums included; a client may stop after "
+            "any packet. A peer's bytes are the smallest single file at no greater error. All labels of the atlas are one surface in both "
+            "directions, for Lathe and for the peers."]
+
+
+def markdown(results, rows, effort, pictures):
+    lines = ["# Bytes over error", "", *introduction(effort), "", "## The figures", "", *figure_table(rows)]
+    for name, r in results.items():
+        lines += ["", f"## {name}", ""]
+        if pictures: lines += [f"![bytes over error](img/bytes_{name}.svg)", ""]
+        lines += [*level_table(r), "", *error_table(r)]
+    return "\n".join(lines) + "\n"
+
+
+def chosen(arguments, effort, folder):
+    """(name, Volume), each opened when its turn comes"""
+    if arguments.volume:
+        name = os.path.basename(arguments.volume).split(".")[0]
+        options = ["--iso", str(arguments.iso)] if arguments.iso is not None else ["--labels", "all"]
+        yield name, volumes.Volume(name, arguments.volume, options, arguments.iso, "folded")
+        return
+    for name in arguments.volumes.split(",") if arguments.volumes else effort.names: yield name, volumes.open_volume(name, folder)
+
+
+def parse_arguments():
+    p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    p.add_argument("--lathe", default=os.path.join(bench.BUILD, "lathe"))
+    p.add_argument("--wasm", default=os.path.join(bench.BUILD, "wasm", "lathe.wasm"))
+    p.add_argument("--tools", default=os.path.join(bench.BUILD, "release", "tests", "bench", "peers"), help="folder of the peers' programs")
+    p.add_argument("--volumes", help=f"some of {','.join(volumes.NAMES)}")
+    p.add_argument("--volume", help="another volume: NIfTI, or the sidecar of a raw one")
+    p.add_argument("--iso", type=float, help="its threshold; without one: all labels")
+    p.add_argument("--quick", action="store_true", help="fewer peers, fewer samples, no atlas")
+    p.add_argument("--json", help="also write every figure there")
+    p.add_argument("--markdown", help="also write the tables there")
+    p.add_argument("--plots", help="also write one SVG for each volume into this folder")
+    p.add_argument("--strict", action="store_true", help="exit status 1 if a figure is missed")
+    return p.parse_args()
+
+
+def write_text(path, words):
+    with open(path, "w") as file: file.write(words)
+
+
+def main():
+    arguments = parse_arguments()
+    effort, results, started = Effort(arguments.quick), {}, time.time()
+    bench.RUNS = 1
+    print("\n".join(introduction(effort)), flush=True)
+    if arguments.plots: os.makedirs(arguments.plots, exist_ok=True)
+    with tempfile.TemporaryDirectory() as folder:
+        for name, volume in chosen(arguments, effort, folder):
+            with tempfile.TemporaryDirectory() as own: results[name] = measure(name, volume, arguments, effort, own)
+            r = results[name]
+            print("\n".join(["", title(name, r), *level_table(r), *error_table(r), f"({r['seconds']} s)"]), flush=True)
+            if arguments.plots: write_text(os.path.join(arguments.plots, f"bytes_{name}.svg"), plot.svg(title(name, r), r["curves"]))
+    rows = list(figures(results, arguments.wasm))
+    missed = sum(holds is False for *_, holds in rows)
+    print("\n".join(["", *figure_table(rows), "", f"{missed} of the figures missed" if missed else "all figures reached",
+                     f"{time.time() - started:.0f} s"]))
+    if arguments.markdown: write_text(arguments.markdown, markdown(results, rows, effort, bool(arguments.plots)))
+    if arguments.json:
+        listed = [dict(zip(("what", "must", "measured", "holds"), row)) for row in rows]
+        write_text(arguments.json, json.dumps({"machine": bench.machine(), "figures": listed, "volumes": results}, indent=1))
+    return 1 if missed and arguments.strict else 0
+
+
+if __name__ == "__main__": sys.exit(main())
