@@ -150,7 +150,7 @@ demo: ## install what is missing, bake a brain and an atlas, serve them on http:
 
 # ---- tests -------------------------------------------------------------------------------------------------------------
 
-.PHONY: test test-programs sanitize sanitize-programs fuzz fuzzers bench soak
+.PHONY: test test-programs sanitize sanitize-programs fuzz fuzzers bench bench-bytes soak
 test: ## install what is missing, build, run every test; ends with "N passed, N failed"
 	@tests/scripts/setup.sh test
 	@tests/scripts/run_tests.sh
@@ -169,6 +169,20 @@ bench: ## measure the figures of the README (needs python3-vtk9); prints the tab
 	@tests/scripts/setup.sh bench
 	@$(MAKE) --no-print-directory $(PARALLEL) all config=release
 	@tests/bench/bench.py
+
+PEERS := $(addprefix $(B)/tests/bench/peers/,peer_codecs lindstrom_turk mask_model)
+bench-bytes: ## measure bytes over error against other coders: docs/BYTES.md, docs/img/bytes_*.svg (QUICK=1: roughly)
+	@tests/scripts/setup.sh bench
+	@$(MAKE) --no-print-directory $(PARALLEL) all bench-peers config=release
+	@tests/bench/bytes.py $(if $(QUICK),--quick,--markdown docs/BYTES.md --plots docs/img --json build/bytes.json)
+.PHONY: bench-peers
+bench-peers: $(PEERS)
+# CGAL's headers do not compile without warnings.
+$(B)/tests/bench/peers/lindstrom_turk.o: WARNINGS :=
+$(B)/tests/bench/peers/lindstrom_turk $(B)/tests/bench/peers/peer_codecs: %: %.o
+	$(Q)$(CXX) $(LINK_MODE) $(LDFLAGS) -o $@ $^ -Wl,--as-needed -ldraco -lmeshoptimizer -lzstd -lgmp -lmpfr
+$(B)/tests/bench/peers/mask_model: %: %.o
+	$(Q)$(CC) $(LINK_MODE) $(LDFLAGS) -o $@ $^ -lm
 
 # Programs that print one table of the papers each.
 TABLES := $(basename $(notdir $(wildcard tests/bench/*.c)))

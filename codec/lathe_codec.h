@@ -109,6 +109,9 @@ typedef struct lathe_world_mesh {
 lathe_status lathe_model_mesh(lathe_world_mesh *out, const lathe_model *model, int64_t structure, uint32_t level,
                               lathe_error *err);
 void lathe_world_mesh_free(lathe_world_mesh *mesh);
+/* Replaces each part by the smooth surface through its vertices [P 4], every edge in k pieces (1 to 16), every triangle in k * k.
+ * Untouched on failure: RANGE, LIMIT, MEMORY. */
+lathe_status lathe_world_mesh_smooth(lathe_world_mesh *mesh, uint32_t k);
 
 /* ---- bake ---------------------------------------------------------------------------------------------------------- */
 
@@ -149,6 +152,10 @@ lathe_status lathe_write_ply(const lathe_world_mesh *mesh, const lathe_write_opt
 lathe_status lathe_write_glb(const lathe_world_mesh *mesh, const lathe_write_options *options, lathe_sink sink, void *context);
 /* Draco edgebreaker, positions at quantization_bits (11 when 0); compression level 10. */
 lathe_status lathe_write_drc(const lathe_world_mesh *mesh, int quantization_bits, lathe_sink sink, void *context);
+/* What takes a client from level - 1 to level (0: its start) by a stock Draco decoder, docs/DRACO_DELTAS.md; structure: index, or -1
+ * for all. Nothing is written if the level changes nothing. The work is that of all levels up to this one. */
+lathe_status lathe_write_draco_delta(const lathe_model *model, int64_t structure, uint32_t level, lathe_sink sink, void *context,
+                                     lathe_error *err);
 
 /* Writes bytes to PATH atomically: temporary file beside it, fsync, rename; on failure nothing is left. */
 typedef struct lathe_atomic_file lathe_atomic_file;

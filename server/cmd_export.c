@@ -37,6 +37,7 @@ typedef struct export_job {
     const char *input, *output;
     mesh_format format;
     int bits;
+    int64_t smooth;            /* pieces of an edge; 0: flat triangles */
 } export_job;
 
 static int write_output(const export_job *job, const lathe_world_mesh *mesh, const lathe_model_info *info) {
@@ -79,19 +80,22 @@ static int export_level(const export_job *job, const lathe_model *model, const c
     lathe_error err = {{0}};
     memset(&mesh, 0, sizeof mesh);
     lathe_status status = lathe_model_mesh(&mesh, model, structure, (uint32_t)level, &err);
-    if (status) return lathe__status_error("export", job->input, status, &err);
-    int result = write_output(job, &mesh, info);
+    if (!status && job->smooth) {
+        status = lathe_world_mesh_smooth(&mesh, (uint32_t)job->smooth);
+        if (status) lathe_fail(&err, status, "smoothing: %s", lathe_status_name(status));
+    }
+    int result = status ? lathe__status_error("export", job->input, status, &err) : write_output(job, &mesh, info);
     lathe_world_mesh_free(&mesh);
     return result;
 }
 
 static int run(int argc, char **argv) {
     const lathe_command *command = &lathe__command_export;
-    const char *output = NULL, *level = NULL, *structure = NULL, *format = NULL, *bits = NULL;
+    const char *output = NULL, *level = NULL, *structure = NULL, *format = NULL, *bits = NULL, *smooth = NULL;
     const lathe_option options[] = {
         LATHE_OPTION_TEXT("output", 'o', &output),       LATHE_OPTION_TEXT("level", 'l', &level),
         LATHE_OPTION_TEXT("structure", 's', &structure), LATHE_OPTION_TEXT("format", 'f', &format),
-        LATHE_OPTION_TEXT("bits", 0, &bits),
+        LATHE_OPTION_TEXT("bits", 0, &bits),             LATHE_OPTION_TEXT("smooth", 0, &smooth),
     };
     int count, status = lathe__parse_options(command, argc, argv, options, sizeof options / sizeof *options, &count);
     if (status != LATHE_PARSED) return status;
@@ -109,6 +113,7 @@ static int run(int argc, char **argv) {
     int64_t bit_count = 0;
     if (bits && !lathe__option_integer(&bit_count, bits, 1, 30)) return lathe__usage_error(command, "--bits %s: 1 to 30", bits);
     job.bits = (int)bit_count;
+    if (smooth && !lathe__option_integer(&job.smooth, smooth, 1, 16)) return lathe__usage_error(command, "--smooth %s: 1 to 16", smooth);
     lathe_model *model = NULL;
     lathe_error err = {{0}};
     lathe_status opened = lathe_model_open(&model, job.input, &err);
@@ -120,11 +125,12 @@ static int run(int argc, char **argv) {
 
 const lathe_command lathe__command_export = {
     "export", "write one level as STL, PLY, GLB or Draco",
-    "Usage: lathe export FILE [--level N] [--structure NAME] [--format stl|ply|glb|drc] -o OUT\n\n"
+    "Usage: lathe export FILE [--level N] [--structure NAME] [--format stl|ply|glb|drc] [--smooth K] -o OUT\n\n"
     "Writes one whole level of FILE (.lathe), in world mm (GLB: metres). OUT appears when it is complete, or not at all.\n\n"
     "  -l, --level N          0 is the base shape; default: `last`, the finest\n"
     "  -s, --structure NAME   only this one; default: all in one file\n"
     "  -f, --format F         default: what OUT ends with\n"
+    "      --smooth K         the smooth surface through the vertices, every edge in K pieces (1 to 16)\n"
     "      --bits N           drc: bits of a coordinate, 11 by default\n"
     "  -o, --output OUT       `-` is standard output\n",
     run};

@@ -3,7 +3,6 @@
 #include "contour_json.h"
 #include "mesh.h"
 #include "reconstruct.h"
-#include "smooth.h"
 #include "twist.h"
 #include <stdlib.h>
 #include <string.h>
@@ -98,30 +97,6 @@ static int write_output(const reconstruct_job *job, const lathe_world_mesh *mesh
     return status ? lathe__status_error("reconstruct", job->output, status, &err) : LATHE_EXIT_OK;
 }
 
-/* The smooth surface over the triangles, every edge in k pieces [P 4]. */
-static lathe_status smooth_world(lathe_world_mesh *world, const lathe_mesh *mesh, const lathe_transform *transform, uint32_t k) {
-    double *corners = NULL, *positions = NULL;
-    uint32_t *triangles = NULL;
-    lathe_smooth *smooth = NULL;
-    lathe_status status = lathe__smooth_mesh_arrays(&corners, &triangles, mesh, transform);
-    lathe_smooth_source source = {mesh->vertex_count, mesh->triangle_count, corners, triangles, LATHE_WEIGHT_ANGLE};
-    if (!status) status = lathe__smooth_open(&smooth, &source);
-    if (!status) status = lathe__smooth_size(smooth, k, &world->vertex_count, &world->triangle_count);
-    if (!status) {
-        positions = malloc(3 * (size_t)world->vertex_count * sizeof *positions);
-        world->positions = malloc(3 * (size_t)world->vertex_count * sizeof *world->positions);
-        world->indices = malloc(3 * (size_t)world->triangle_count * sizeof *world->indices);
-        status = positions && world->positions && world->indices ? lathe__smooth_evaluate(smooth, k, positions, NULL, world->indices)
-                                                                 : LATHE_ERR_MEMORY;
-    }
-    for (size_t i = 0; !status && i < 3 * (size_t)world->vertex_count; i++) world->positions[i] = (float)positions[i];
-    lathe__smooth_close(&smooth);
-    free(corners);
-    free(positions);
-    free(triangles);
-    return status;
-}
-
 static lathe_status plain_world(lathe_world_mesh *world, const lathe_mesh *mesh, const lathe_transform *transform) {
     world->vertex_count = mesh->vertex_count;
     world->triangle_count = mesh->triangle_count;
@@ -137,16 +112,14 @@ static int export_mesh(const reconstruct_job *job, const lathe_mesh *mesh, const
     lathe_world_mesh world;
     memset(&world, 0, sizeof world);
     world.parts = calloc(1, sizeof *world.parts);
-    lathe_status status = !world.parts  ? LATHE_ERR_MEMORY
-                          : job->smooth ? smooth_world(&world, mesh, transform, (uint32_t)job->smooth)
-                                        : plain_world(&world, mesh, transform);
-    int result = status ? lathe__status_error("reconstruct", job->input, status, NULL) : LATHE_EXIT_OK;
+    lathe_status status = world.parts ? plain_world(&world, mesh, transform) : LATHE_ERR_MEMORY;
     if (!status) {
         world.structure_count = 1;
         world.parts[0].vertex_count = world.vertex_count;
         world.parts[0].triangle_count = world.triangle_count;
-        result = write_output(job, &world);
+        if (job->smooth) status = lathe_world_mesh_smooth(&world, (uint32_t)job->smooth);
     }
+    int result = status ? lathe__status_error("reconstruct", job->input, status, NULL) : write_output(job, &world);
     lathe_world_mesh_free(&world);
     return result;
 }
@@ -249,8 +222,8 @@ static int parse_input(reconstruct_job *job, const lathe_command *command, const
     if (t->iso && !lathe__option_number(&job->iso, t->iso)) return lathe__usage_error(command, "--iso %s: a number is needed", t->iso);
     if (t->label && !lathe__option_integer(&job->label, t->label, -(1 << 24), 1 << 24))
         return lathe__usage_error(command, "--label %s: a whole number is needed", t->label);
-    if (t->smooth && !lathe__option_integer(&job->smooth, t->smooth, 1, LATHE_SMOOTH_MAX))
-        return lathe__usage_error(command, "--smooth %s: 1 to %d", t->smooth, LATHE_SMOOTH_MAX);
+    if (t->smooth && !lathe__option_integer(&job->smooth, t->smooth, 1, 16))
+        return lathe__usage_error(command, "--smooth %s: 1 to 16", t->smooth);
     if (t->hierarchy && (!lathe__option_number(&job->tolerance, t->hierarchy) || job->tolerance <= 0))
         return lathe__usage_error(command, "--hierarchy %s: a number of mm above 0", t->hierarchy);
     if (t->strip && (!lathe__option_number(&job->strip, t->strip) || job->strip <= 0))

@@ -12,10 +12,11 @@ static const format FORMATS[] = {{"drc", "application/octet-stream"},
                                  {"stl", "model/stl"},
                                  {"ply", "application/octet-stream"}};
 enum { DRC, GLB, STL, PLY, FORMAT_COUNT };
+enum { MOST_SMOOTH = 8 };
 typedef struct level {
     lathe_entry *entry;
     int64_t structure;
-    uint32_t level;
+    uint32_t level, smooth;    /* smooth: pieces of an edge, 0: flat triangles */
     int format;
 } level;
 
@@ -36,6 +37,7 @@ static lathe_status build_level(lathe_body *body, void *context, lathe_error *er
     lathe_world_mesh mesh = {0};
     lathe_buffer out = {0};
     lathe_status status = lathe_model_mesh(&mesh, l->entry->model, l->structure, l->level, err);
+    if (!status && l->smooth && (status = lathe_world_mesh_smooth(&mesh, l->smooth)) != LATHE_OK) lathe_world_mesh_free(&mesh);
     if (!status) {
         status = write_mesh(&out, &mesh, l);
         lathe_world_mesh_free(&mesh);
@@ -79,21 +81,29 @@ static enum MHD_Result reply(lathe_request *request, level *l) {
     if (l->level > own_last) l->level = own_last;
     lathe_recipe recipe = {
         .type = FORMATS[l->format].type, .traits = LATHE_RANGES, .entry = l->entry, .build = build_level, .context = l};
-    snprintf(recipe.key, sizeof recipe.key, "%s:%s:level:%lld:%u:%d", l->entry->id, l->entry->hash,
-             (long long)l->structure, l->level, l->format);
+    snprintf(recipe.key, sizeof recipe.key, "%s:%s:level:%lld:%u:%d:%u", l->entry->id, l->entry->hash,
+             (long long)l->structure, l->level, l->format, l->smooth);
     name_file(&recipe, l);
     return lathe__respond(request, &recipe);
 }
 
+/* ?smooth=K; false: *result is the complaint. */
+static bool query_smooth(lathe_request *request, uint32_t *out, enum MHD_Result *result) {
+    const char *text = lathe__request_query(request, "smooth");
+    if (!text || (lathe__parse_number(text, out) && *out >= 1 && *out <= MOST_SMOOTH)) return true;
+    *result = lathe__respond_problem(request, 400, "smooth must be 1 to %d: how many pieces an edge is cut into", MOST_SMOOTH);
+    return false;
+}
+
 enum MHD_Result lathe__handle_level(lathe_request *request) {
     enum MHD_Result result;
-    level l = {lathe__request_entry(request, &result), -1, 0, 0};
+    level l = {lathe__request_entry(request, &result), -1, 0, 0, 0};
     if (!l.entry) return result;
     if (!parse_name(request->captures[1], &l.level, &l.format))
         result =
             lathe__respond_problem(request, 404, "a level is named {n}.drc, {n}.glb, {n}.stl or {n}.ply, n in 0..%u",
                                    lathe__entry_levels(l.entry, -1) - 1);
-    else if (lathe__request_structure(request, l.entry, &l.structure, &result))
+    else if (query_smooth(request, &l.smooth, &result) && lathe__request_structure(request, l.entry, &l.structure, &result))
         result = reply(request, &l);
     lathe__entry_release(l.entry);
     return result;

@@ -168,7 +168,7 @@ static bool cut_query(lathe_request *request, char *query, const char **why) {
         request->query[request->query_count].name = part;
         request->query[request->query_count++].value = value ? value : "";
     }
-    static const char *const once[] = {"structure", "from", "to", "v", "tolerance", "rays"};
+    static const char *const once[] = {"structure", "from", "to", "v", "tolerance", "smooth", "rays"};
     for (size_t k = 0; k < sizeof once / sizeof *once; k++) {
         unsigned seen = 0;
         for (unsigned i = 0; i < request->query_count; i++) seen += !strcmp(request->query[i].name, once[k]);

@@ -369,6 +369,10 @@ static void flipped_streams(const file *f) {
 
 int main(int argc, char **argv) {
     const char *anew = argc == 3 && !strcmp(argv[1], "--write") ? argv[2] : NULL;
+    if (argc > 1 && (!anew || (strcmp(anew, "packets") && strcmp(anew, "meshes")))) {
+        fputs("usage: test_golden [--write packets|meshes]\n", stderr);
+        return 2;
+    }
     char *text[2];
     size_t size[2];
     FILE *packets = open_memstream(&text[0], &size[0]), *meshes = open_memstream(&text[1], &size[1]);
@@ -396,10 +400,9 @@ int main(int argc, char **argv) {
     if (!anew) {
         compare("packets.txt", text[0]);
         compare("meshes.txt", text[1]);
-    } else if (!strcmp(anew, "packets")) {
-        write_anew("packets.txt", text[0]);
-    } else if (!strcmp(anew, "meshes")) {
-        write_anew("meshes.txt", text[1]);
+    } else {
+        bool of_packets = !strcmp(anew, "packets");
+        write_anew(of_packets ? "packets.txt" : "meshes.txt", text[of_packets ? 0 : 1]);
     }
     free(text[0]);
     free(text[1]);

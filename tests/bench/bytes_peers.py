@@ -5,14 +5,14 @@ import numpy as np
 import bench
 from bytes_distance import arrays_of, read_mesh, write_mesh
 
-WORST = 4.0                 # voxels: what is worse is left out
+WORST, BEST = 4.0, 0.05     # voxels: decimated meshes outside are left out
 LADDER = (4.0, 2.0, 1.0, 0.5, 0.25, 0.125)   # errors of the levels that a chain of meshes would have
 state = {}                  # what forked workers inherit
 
 
-def fractions(step, first):
-    """Falling, each `step` times the one before, from `first` down to a 500th"""
-    return [first * step ** i for i in range(int(math.log(0.002 / first) / math.log(step)) + 1)]
+def fractions(step, first=0.5, last=0.0005):
+    """Falling, each `step` times the one before"""
+    return [first * step ** i for i in range(int(math.log(last / first) / math.log(step)) + 1)]
 
 
 def tool(folder, name, *arguments):
@@ -25,29 +25,37 @@ def tool(folder, name, *arguments):
 
 
 def lindstrom_turk(tools, mesh, folder, wanted):
+    last = math.inf
     for row in tool(tools, "lindstrom_turk", mesh, os.path.join(folder, "turk"), ",".join(f"{f:.6g}" for f in wanted)):
+        if row["triangles"] > 0.98 * last: return      # nothing more can be collapsed
+        last = row["triangles"]
         yield "Lindstrom-Turk", row["fraction"], row["path"]
 
 
 def quadric(surface, folder, wanted):
-    """VTK's quadric decimation, each mesh from the one before it"""
+    """VTK's quadric decimation, each mesh from the one before it. Points at one place are merged first: it stalls on them"""
     import vtk
-    full = surface.GetNumberOfPolys()
+    merged = vtk.vtkCleanPolyData()
+    merged.SetInputData(surface)
+    merged.Update()
+    surface = merged.GetOutput()
+    full, last = surface.GetNumberOfPolys(), math.inf
     for i, fraction in enumerate(wanted):
         decimation = vtk.vtkQuadricDecimation()
         decimation.SetInputData(surface)
         decimation.SetTargetReduction(max(0.0, 1 - fraction * full / max(1, surface.GetNumberOfPolys())))
         decimation.Update()
         surface = decimation.GetOutput()
-        if surface.GetNumberOfPolys() < 4: return
+        if not 4 <= surface.GetNumberOfPolys() <= 0.98 * last: return
+        last = surface.GetNumberOfPolys()
         path = os.path.join(folder, f"quadric{i}.mesh")
         write_mesh(path, *arrays_of(surface))
         yield "quadric", fraction, path
 
 
 def sensible_bits(error, extent):
-    """Grids whose own error is neither lost in the mesh's nor far above it"""
-    return [b for b in range(4, 15) if 0.1 * error < extent / 2 ** b / 12 ** 0.5 < 3 * error]
+    """Grids whose own error is neither lost in the mesh's nor far above it: three or four"""
+    return [b for b in range(4, 15) if 0.15 * error < extent / 2 ** b / 12 ** 0.5 < 2 * error]
 
 
 def measure_mesh(job):
@@ -57,8 +65,8 @@ def measure_mesh(job):
     mesh = read_mesh(path)
     if len(mesh[1]) < 4: return []
     exact = reference.error(*mesh[:2], samples // 2)["rms"]
-    if exact > WORST: return []
-    bits = sensible_bits(max(exact, 0.03) * reference.voxel, reference.extent)
+    if not BEST <= exact <= WORST: return []
+    bits = sensible_bits(exact * reference.voxel, reference.extent)
     rows = []
     for row in tool(tools, "peer_codecs", path, path + ".", ",".join(map(str, bits))) if bits else []:
         error = reference.error(*read_mesh(row["path"])[:2], samples)
@@ -69,13 +77,12 @@ def measure_mesh(job):
     return rows
 
 
-def sweep(reference, tools, folder, samples, step, first, with_quadric, processes):
+def sweep(reference, tools, folder, samples, step, with_quadric, processes):
     """Every peer: decimation x codec x quantisation, each with its bytes and two-sided error"""
-    full, wanted = os.path.join(folder, "full.mesh"), fractions(step, first)
+    full, wanted = os.path.join(folder, "full.mesh"), fractions(step)
     write_mesh(full, *arrays_of(reference.surface))
-    jobs = [("no decimation", 1.0, full)] if first == 1 else []
-    jobs += lindstrom_turk(tools, full, folder, wanted)
-    if with_quadric: jobs += quadric(reference.surface, folder, wanted[::2])
+    jobs = list(lindstrom_turk(tools, full, folder, wanted))
+    if with_quadric: jobs += quadric(reference.surface, folder, wanted[1::3])
     state.update(reference=reference, samples=samples, tools=tools)
     reference.sample(samples), reference.sample(samples // 2)
     with get_context("fork").Pool(processes) as pool: return [row for rows in pool.imap(measure_mesh, jobs, 1) for row in rows]

@@ -35,21 +35,30 @@ def axes(x, y, xs, ys):
     return lines
 
 
+def steps(places):
+    """As stairs: who wants less error than a point has pays for the next one"""
+    path = f"M{places[0][0]:.1f} {places[0][1]:.1f}"
+    return path + "".join(f"V{b:.1f}H{a:.1f}" for a, b in places[1:])
+
+
 def curve(x, y, name, points, colour, index):
-    wide = 3 if index == 0 else 1.6
+    """points: errors falling"""
+    wide, radius = (3, 3.2) if index == 0 else (1.4, 1.8)
+    if len(points) == 1: radius = 5
     places = [(x(e), y(b)) for e, b in points]
-    lines = [f'<polyline points="{" ".join(f"{a:.1f},{b:.1f}" for a, b in places)}" fill="none" stroke="{colour}" stroke-width="{wide}"/>'] \
-        if len(places) > 1 else []
-    lines += [f'<circle cx="{a:.1f}" cy="{b:.1f}" r="{3.2 if index == 0 else 2.2}" fill="{colour}"><title>{escape(name)}: {e:.3f} voxel, {n:,} B</title></circle>'
+    lines = [f'<path d="{steps(places)}" fill="none" stroke="{colour}" stroke-width="{wide}"/>'] if len(places) > 1 else []
+    lines += [f'<circle cx="{a:.1f}" cy="{b:.1f}" r="{radius}" fill="{colour}"><title>{escape(name)}: {e:.3f} voxel, {n:,} B</title></circle>'
               for (a, b), (e, n) in zip(places, points)]
     row = TOP + 20 + 19 * index
-    lines.append(f'<path d="M{LEFT + 14} {row - 4}h22" stroke="{colour}" stroke-width="{wide}"/>' + text(LEFT + 42, row, name, "start"))
+    mark = f'<path d="M{LEFT + 14} {row - 4}h22" stroke="{colour}" stroke-width="{wide}"/>' if len(places) > 1 else \
+        f'<circle cx="{LEFT + 25}" cy="{row - 4}" r="{radius}" fill="{colour}"/>'
+    lines.append(mark + text(LEFT + 42, row, name, "start"))
     return lines
 
 
 def svg(title, curves):
     """curves: {name: [(rms, bytes), ...]}; the first one is drawn strongest. The plot as text"""
-    curves = {name: sorted((max(e, 1e-3), b) for e, b in points) for name, points in curves.items() if points}
+    curves = {name: sorted(((max(e, 1e-3), b) for e, b in points), reverse=True) for name, points in curves.items() if points}
     errors, sizes = ([p[k] for points in curves.values() for p in points] for k in (0, 1))
     xs, ys = (min(errors) / 1.1, max(errors) * 1.1), (min(sizes) / 1.4, max(sizes) * 1.4)
     def scale(value, low, high, start, end): return start + (end - start) * math.log(value / low) / math.log(high / low)
@@ -58,5 +67,5 @@ def svg(title, curves):
     lines = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="sans-serif" fill="#222">',
              f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#fff"/>', text(WIDTH / 2, 27, title, size=16)]
     lines += axes(x, y, xs, ys)
-    for i, (name, points) in enumerate(curves.items()): lines += curve(x, y, name, points, STYLES[i % len(STYLES)], i)
+    for i, (name, points) in reversed(list(enumerate(curves.items()))): lines += curve(x, y, name, points, STYLES[i % len(STYLES)], i)
     return "\n".join(lines + ["</svg>"]) + "\n"

@@ -84,7 +84,7 @@ bake('keep_stars', raw('keep_stars', [30, 24, 28], (x, y, z) => ball(x - 13, y -
 bake('radius', raw('radius', [30, 30, 30], (x, y, z) => ball(x - 14.5, y - 15, z - 15.2, 12)), '--iso', '0');
 bake('twisted', raw('twisted', [36, 38, 33], cone), '--iso', '0');
 bake('shared', raw('shared', [56, 37, 29], label), '--labels', 'all');
-bake('independent', raw('independent', [56, 37, 29], label, [1, 1, 1.5]), '--labels', 'all', '--independent');
+bake('independent', raw('independent', [56, 37, 29], label, [1, 1, 1.1]), '--labels', 'all', '--independent');
 bake('keep_labels', raw('keep_labels', [56, 37, 29], label), '--labels', 'all', '--topology', 'keep', '--axis', 'x');
 /* Turned, sheared by its spacing, mirrored. */
 const tilt = [[-0.8, 0.45, 0.3, 12.5], [0.36, 1.1, -0.7, -40], [-0.12, 0.2, 2.3, 7.25]];
@@ -94,5 +94,13 @@ bake('oblique_radius', nifti('oblique_radius', [38, 33, 36], (x, y, z) => cone(z
 const disc = (r, n) => (x, y, z) => Math.min(r - Math.hypot(x - n / 2, y - n / 2 + 3 * z), Math.hypot(x - n / 3, y - n / 2) - r / 4) + 9 * rough(x, y, z);
 bake('wide', raw('wide', [100, 100, 5], disc(38, 100)), '--iso', '0');
 bake('wider', raw('wider', [150, 140, 3], disc(58, 150)), '--iso', '0', '--boundary', 'edge');
+/* Many levels: gaps of 8 and more between known slices; fewer rays than levels could halve; turned to the other side. */
+bake('tall', raw('tall', [20, 20, 80], (x, y, z) => Math.min(6 - Math.hypot(x - 10, y - 10), ball(x - 10, y - 10, z - 40, 39), 3 - ball(x - 10, y - 10, z - 40, 6)) + fine(x, y, z) / 2),
+    '--iso', '0', '--topology', 'keep');
+bake('long', raw('long', [44, 40, 80], (x, y, z) => cone(x, y, z / 3 + 4) + (x + y) / 50), '--iso', '0', '--axis', 'z');
+bake('long_back', raw('long_back', [40, 44, 80], (x, y, z) => cone(y, x, z / 3 + 4)), '--iso', '0');
+/* One model for structures of different sizes. */
+bake('sizes', raw('sizes', [110, 90, 8], (x, y, z) => (Math.abs(Math.hypot(x - 50, y - 45) - 35) < 6 + 2 * rough(x, y, z) ? -3 : ball(x - 50, y - 45, z * 2 - 8, 9) > 0 ? 12 :
+    x > 100 && y > 60 && z > 2 ? 40 : 0)), '--labels', 'all');
 bake('thin', raw('thin', [20, 16, 1], (x, y) => ball(x - 9, y - 8, 0, 6) + rough(x, y, 3)), '--iso', '0');
 rmSync(scratch, { recursive: true });

@@ -13,7 +13,8 @@ case $purpose in
 build) ;;
 demo) wanted="mricron-data" ;;
 test) tools="$tools curl brotli chromium" libraries="$libraries libcgal-dev libgmp-dev libmpfr-dev mricron-data" ;;
-bench) tools="$tools python3" libraries="$libraries mricron-data python3-vtk9 python3-numpy python3-nibabel" ;;
+bench) tools="$tools python3" libraries="$libraries mricron-data python3-vtk9 python3-numpy python3-nibabel"
+    libraries="$libraries libmeshoptimizer-dev libzstd-dev libcgal-dev libgmp-dev libmpfr-dev" ;;
 *) echo "usage: setup.sh build|demo|test|bench" >&2; exit 2 ;;
 esac
 

@@ -1,0 +1,330 @@
+/* Draco deltas of a model: the levels up to the wanted one are built and walked one after another, because which vertices are
+ * old, and where they lie, depends on all of them. */
+#include "draco_delta.h"
+#include "restream.h"
+#include <stdlib.h>
+#include <string.h>
+
+void lathe__draco_mesh_free(lathe_draco_mesh *mesh) {
+    for (uint32_t i = 0; i < mesh->part_count; i++) {
+        free(mesh->parts[i].heights);
+        free(mesh->parts[i].triangles);
+        free(mesh->parts[i].contour);
+    }
+    free(mesh->parts);
+    free(mesh->at);
+    free(mesh->next);
+    *mesh = (lathe_draco_mesh){0};
+}
+
+lathe_status lathe__draco_delta_apply(lathe_draco_mesh *mesh, const uint8_t *bytes, size_t size) {
+    if (!size) {
+        mesh->level_count++;
+        return LATHE_OK;
+    }
+    lathe_draco_carrier carrier = {0};
+    lathe_status status = lathe__draco_unpack(&carrier, bytes, size);
+    if (status) return status;
+    if (carrier.affine) memcpy(mesh->affine, carrier.affine, sizeof mesh->affine);
+    status = lathe__draco_walk(mesh, &carrier, NULL);
+    lathe__draco_carrier_free(&carrier);
+    return status;
+}
+
+/* ---- a level's changed structures in one ---- */
+
+typedef struct level_mesh {
+    uint32_t vertex_count, triangle_count, vertex_room, triangle_room;
+    int32_t (*exact)[3];       /* of the volume's frame, lattice units */
+    int32_t *half;
+    uint32_t *part;
+    uint32_t (*triangles)[3];
+} level_mesh;
+
+static void free_level(level_mesh *level) {
+    free(level->exact);
+    free(level->half);
+    free(level->part);
+    free(level->triangles);
+    *level = (level_mesh){0};
+}
+
+static bool grow(void **array, size_t count, size_t size) {
+    void *more = count > SIZE_MAX / size ? NULL : realloc(*array, count * size);
+    if (more) *array = more;
+    return more != NULL;
+}
+
+static lathe_status reserve(level_mesh *level, uint32_t vertices, uint32_t triangles) {
+    uint64_t v = (uint64_t)level->vertex_count + vertices, t = (uint64_t)level->triangle_count + triangles;
+    if (v > INT32_MAX / 3 || t > INT32_MAX / 3) return LATHE_ERR_LIMIT;
+    bool good = true;
+    if (v > level->vertex_room) {
+        level->vertex_room = (uint32_t)(v + v / 2);
+        good = grow((void **)&level->exact, level->vertex_room, sizeof *level->exact) &&
+               grow((void **)&level->half, level->vertex_room, sizeof *level->half) &&
+               grow((void **)&level->part, level->vertex_room, sizeof *level->part);
+    }
+    if (good && t > level->triangle_room) {
+        level->triangle_room = (uint32_t)(t + t / 2);
+        good = grow((void **)&level->triangles, level->triangle_room, sizeof *level->triangles);
+    }
+    return good ? LATHE_OK : LATHE_ERR_MEMORY;
+}
+
+/* Twice the number of the slice at a height, or of the one below, plus one. */
+static int32_t half_of(const int32_t *slices, uint32_t count, int32_t w) {
+    uint32_t low = 0, high = count;
+    while (low < high) {
+        uint32_t middle = (low + high) / 2;
+        if ((int64_t)slices[middle] * LATHE_LATTICE_ONE < w) low = middle + 1;
+        else high = middle;
+    }
+    bool shown = low < count && slices[low] * LATHE_LATTICE_ONE == w;
+    return shown ? 2 * (int32_t)low : 2 * (int32_t)low - 1;
+}
+
+typedef struct place_of_box { const int32_t *origin, *slices; uint32_t slice_count, structure; bool mirrored; } place_of_box;
+
+static lathe_status append(level_mesh *level, const lathe_mesh *mesh, const place_of_box *box) {
+    lathe_status status = reserve(level, mesh->vertex_count, mesh->triangle_count);
+    if (status) return status;
+    uint32_t base = level->vertex_count;
+    for (uint32_t i = 0; i < mesh->vertex_count; i++) {
+        level->half[base + i] = half_of(box->slices, box->slice_count, mesh->lattice[i][2]);
+        level->part[base + i] = box->structure;
+        for (int k = 0; k < 3; k++) level->exact[base + i][k] = mesh->lattice[i][k] + box->origin[k] * LATHE_LATTICE_ONE;
+    }
+    for (uint32_t t = 0; t < mesh->triangle_count; t++)
+        for (int k = 0; k < 3; k++) level->triangles[level->triangle_count + t][k] = base + mesh->triangles[t][box->mirrored && k ? 3 - k : k];
+    level->vertex_count += mesh->vertex_count;
+    level->triangle_count += mesh->triangle_count;
+    return LATHE_OK;
+}
+
+/* ---- one delta ---- */
+
+static lathe_status copy_triangles(lathe_draco_carrier *to, const void *triangles, uint32_t vertices, uint32_t count) {
+    *to = (lathe_draco_carrier){.vertex_count = vertices, .triangle_count = count};
+    to->triangles = malloc((size_t)3 * count * sizeof *to->triangles + 1);
+    for (int k = 0; k < 2; k++) to->value[k] = calloc((size_t)vertices + 1, sizeof(int32_t));
+    if (!to->triangles || !to->value[0] || !to->value[1]) return LATHE_ERR_MEMORY;
+    memcpy(to->triangles, triangles, (size_t)3 * count * sizeof *to->triangles);
+    return LATHE_OK;
+}
+
+/* In which order Draco gives vertices and triangles back: they are sent there and back with their numbers. */
+static lathe_status find_order(lathe_draco_carrier *back, const level_mesh *level) {
+    lathe_draco_carrier there = {0};
+    uint8_t *bytes = NULL;
+    size_t size = 0;
+    lathe_status status = copy_triangles(&there, level->triangles, level->vertex_count, level->triangle_count);
+    for (uint32_t v = 0; !status && v < level->vertex_count; v++) there.value[0][v] = (int32_t)v;
+    if (!status) status = lathe__draco_pack(&bytes, &size, &there);
+    if (!status) status = lathe__draco_unpack(back, bytes, size);
+    if (!status && (back->vertex_count != level->vertex_count || back->triangle_count != level->triangle_count)) status = LATHE_ERR_UNSUPPORTED;
+    free(bytes);
+    lathe__draco_carrier_free(&there);
+    return status;
+}
+
+/* The level's vertices in Draco's order. *order: which they are in the level. */
+static lathe_status reorder(level_mesh *sorted, const level_mesh *level, const lathe_draco_carrier *back) {
+    lathe_status status = reserve(sorted, level->vertex_count, 0);
+    for (uint32_t v = 0; !status && v < level->vertex_count; v++) {
+        uint32_t from = (uint32_t)back->value[0][v];
+        if (from >= level->vertex_count) return LATHE_ERR_UNSUPPORTED;
+        memcpy(sorted->exact[v], level->exact[from], sizeof sorted->exact[v]);
+        sorted->half[v] = level->half[from];
+        sorted->part[v] = level->part[from];
+    }
+    sorted->vertex_count = level->vertex_count;
+    return status;
+}
+
+/* Packs what the walk has made, in the order of the level, so that Draco turns it the same way again. */
+static lathe_status pack(uint8_t **out, size_t *size, const level_mesh *level, const lathe_draco_carrier *walked, const uint32_t *order,
+                         double *affine) {
+    lathe_draco_carrier c = {0}, check = {0};
+    lathe_status status = copy_triangles(&c, level->triangles, level->vertex_count, level->triangle_count);
+    for (uint32_t v = 0; !status && v < level->vertex_count; v++)
+        for (int k = 0; k < 2; k++) c.value[k][order[v]] = walked->value[k][v];
+    c.words = walked->words;
+    c.word_count = walked->word_count;
+    c.affine = affine;
+    if (!status) status = lathe__draco_pack(out, size, &c);
+    c.words = NULL;
+    c.affine = NULL;
+    lathe__draco_carrier_free(&c);
+    if (!status) status = lathe__draco_unpack(&check, *out, *size);
+    if (!status && memcmp(check.triangles, walked->triangles, (size_t)3 * check.triangle_count * sizeof *check.triangles) != 0)
+        status = LATHE_ERR_UNSUPPORTED;
+    lathe__draco_carrier_free(&check);
+    return status;
+}
+
+/* Moves the mesh to the level; out may be NULL. */
+static lathe_status write_delta(uint8_t **out, size_t *size, lathe_draco_mesh *mesh, const level_mesh *level,
+                                const struct lathe_draco_heights *heights, double *affine) {
+    lathe_draco_carrier carrier = {0};
+    level_mesh sorted = {0};
+    uint32_t *order = NULL;
+    lathe_status status = find_order(&carrier, level);
+    if (!status) status = reorder(&sorted, level, &carrier);
+    if (!status && !(order = malloc(((size_t)level->vertex_count + 1) * sizeof *order))) status = LATHE_ERR_MEMORY;
+    for (uint32_t v = 0; !status && v < level->vertex_count; v++) order[v] = (uint32_t)carrier.value[0][v];
+    lathe_draco_truth truth = {(const int32_t(*)[3])sorted.exact, sorted.half, sorted.part, heights};
+    if (!status) status = lathe__draco_walk(mesh, &carrier, &truth);
+    if (!status && out) status = pack(out, size, level, &carrier, order, affine);
+    free(order);
+    free_level(&sorted);
+    lathe__draco_carrier_free(&carrier);
+    return status;
+}
+
+/* ---- the levels of a model ---- */
+
+typedef struct delta_writer {
+    lathe_decoder *decoder;
+    lathe_status fed;
+    const lathe_model *model;
+    int64_t structure;         /* -1: all */
+    bool alone;                /* the stream is that of the structure alone */
+    uint32_t structure_count;
+    lathe_draco_mesh mesh;
+    lathe_mesh *latest;        /* of each structure, to see what changes */
+    struct lathe_draco_heights *heights; /* owned */
+    level_mesh level;
+    double affine[12];
+} delta_writer;
+
+static int feed(void *context, const void *bytes, size_t size) {
+    delta_writer *d = context;
+    d->fed = lathe_decoder_feed(d->decoder, bytes, size);
+    return d->fed != LATHE_OK;
+}
+
+static void close_writer(delta_writer *d) {
+    for (uint32_t i = 0; i < d->structure_count; i++) {
+        if (d->latest) lathe_mesh_free(&d->latest[i]);
+        if (d->heights) free((void *)(uintptr_t)d->heights[i].at);
+    }
+    free(d->latest);
+    free(d->heights);
+    free_level(&d->level);
+    lathe__draco_mesh_free(&d->mesh);
+    lathe_decoder_close(&d->decoder);
+}
+
+static bool is_same(const lathe_mesh *a, const lathe_mesh *b) {
+    return a->vertex_count == b->vertex_count && a->triangle_count == b->triangle_count &&
+           !memcmp(a->lattice, b->lattice, (size_t)a->vertex_count * sizeof *a->lattice) &&
+           !memcmp(a->triangles, b->triangles, (size_t)a->triangle_count * sizeof *a->triangles);
+}
+
+static lathe_status keep(lathe_mesh *to, const lathe_mesh *from) {
+    lathe_mesh_free(to);
+    *to = (lathe_mesh){from->vertex_count, from->triangle_count, malloc((size_t)from->vertex_count * sizeof *to->lattice + 1),
+                       malloc((size_t)from->triangle_count * sizeof *to->triangles + 1)};
+    if (!to->lattice || !to->triangles) return LATHE_ERR_MEMORY;
+    memcpy(to->lattice, from->lattice, (size_t)from->vertex_count * sizeof *to->lattice);
+    memcpy(to->triangles, from->triangles, (size_t)from->triangle_count * sizeof *to->triangles);
+    return LATHE_OK;
+}
+
+static void set_affine(delta_writer *d, const lathe_transform *t, const int32_t *origin) {
+    double unit = LATHE_LATTICE_ONE / LATHE_DRACO_ONE;
+    for (int i = 0; i < 3; i++) {
+        double shift = t->m[i][3];
+        for (int k = 0; k < 3; k++) {
+            d->affine[4 * i + k] = t->m[i][k] * unit;
+            shift -= t->m[i][k] * LATHE_LATTICE_ONE * origin[k];
+        }
+        d->affine[4 * i + 3] = shift;
+    }
+}
+
+/* A structure has come to a level. */
+static lathe_status add_structure(delta_writer *d, uint32_t own, uint32_t structure, uint32_t level) {
+    const lathe_mesh *mesh = lathe_decoder_mesh(d->decoder, own);
+    if (!mesh) return LATHE_ERR_FORMAT;
+    if (is_same(&d->latest[structure], mesh)) return LATHE_OK;
+    lathe_status status = keep(&d->latest[structure], mesh);
+    if (status) return status;
+    const lathe_structure_state *state = lathe__decoder_state(d->decoder, own);
+    const lathe_transform *transform = lathe_decoder_transform(d->decoder, own);
+    if (!d->mesh.level_count) set_affine(d, transform, state->mask.origin);
+    lathe_arena arena = {0};
+    int32_t *slices, *heights = NULL;
+    uint32_t count = 0;
+    status = lathe__level_slices(&slices, &count, &arena, &state->plan, level);
+    place_of_box box = {state->mask.origin, slices, count, structure, lathe_transform_mirrors(transform)};
+    if (!status) status = append(&d->level, mesh, &box);
+    if (!status && !(heights = malloc((count + 1) * sizeof *heights))) status = LATHE_ERR_MEMORY;
+    for (uint32_t i = 0; !status && i < count; i++) heights[i] = slices[i] + state->mask.origin[2];
+    if (!status) {
+        free((void *)(uintptr_t)d->heights[structure].at);
+        d->heights[structure] = (struct lathe_draco_heights){count, heights};
+    }
+    lathe__arena_free(&arena);
+    return status;
+}
+
+static lathe_status end_level(delta_writer *d, bool wanted, uint8_t **out, size_t *size) {
+    lathe_status status = LATHE_OK;
+    if (d->level.triangle_count)
+        status = write_delta(wanted ? out : NULL, size, &d->mesh, &d->level, d->heights, d->mesh.level_count ? NULL : d->affine);
+    else d->mesh.level_count++;
+    d->level.vertex_count = d->level.triangle_count = 0;
+    return status;
+}
+
+static lathe_status run(delta_writer *d, uint32_t level, uint8_t **out, size_t *size) {
+    lathe_step step;
+    uint32_t at = 0;
+    for (;;) {
+        lathe_status status = lathe_decoder_step(d->decoder, &step);
+        if (status == LATHE_MORE) break;
+        while (!status && at < step.level) status = end_level(d, false, out, size), at++;
+        uint32_t structure = d->alone ? (uint32_t)d->structure : step.structure;
+        if (!status && (d->structure < 0 || structure == d->structure)) status = add_structure(d, step.structure, structure, step.level);
+        if (status) return status;
+    }
+    while (at < level) {
+        lathe_status status = end_level(d, false, out, size);
+        if (status) return status;
+        at++;
+    }
+    return end_level(d, true, out, size);
+}
+
+static lathe_status open_writer(delta_writer *d, uint32_t level) {
+    d->latest = calloc((size_t)d->structure_count + 1, sizeof *d->latest);
+    d->heights = calloc((size_t)d->structure_count + 1, sizeof *d->heights);
+    lathe_status status = lathe_decoder_open(&d->decoder);
+    if (status || !d->latest || !d->heights) return LATHE_ERR_MEMORY;
+    lathe_decoder_build_meshes(d->decoder, false);
+    status = lathe_model_stream(d->model, d->alone ? d->structure : -1, 0, level, feed, d);
+    return d->fed ? d->fed : status;
+}
+
+lathe_status lathe_write_draco_delta(const lathe_model *model, int64_t structure, uint32_t level, lathe_sink sink, void *context,
+                                     lathe_error *err) {
+    const lathe_model_info *info = lathe_model_describe(model);
+    if (structure >= info->structure_count)
+        return lathe_fail(err, LATHE_ERR_RANGE, "structure %lld: the model has %u", (long long)structure, info->structure_count);
+    if (level >= info->level_count)
+        return lathe_fail(err, LATHE_ERR_RANGE, "level %u: the last one is %u", level, info->level_count - 1);
+    delta_writer d = {.model = model, .structure = structure, .alone = structure >= 0 && info->independent,
+                      .structure_count = info->structure_count};
+    uint8_t *bytes = NULL;
+    size_t size = 0;
+    lathe_status status = open_writer(&d, level);
+    if (!status) status = run(&d, level, &bytes, &size);
+    const char *detail = d.decoder ? lathe_decoder_error(d.decoder) : "";
+    if (status) lathe_fail(err, status, "%s", *detail ? detail : lathe_status_name(status));
+    close_writer(&d);
+    if (!status && size && sink(context, bytes, size)) status = LATHE_ERR_IO;
+    free(bytes);
+    return status;
+}

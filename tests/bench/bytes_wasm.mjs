@@ -1,0 +1,47 @@
+// bytes_wasm.mjs ARCHIVE DECODER.wasm [BLOCK [BLOCKS]]: CPU seconds of the viewer's decoder for one decoding of an archive to the last
+// meshes, as `lathe bench decode` measures it natively. BLOCK instances, made before the clock starts, decode one after the other, so
+// that small archives take long enough to be measured; the fastest of BLOCKS counts. Building a mesh is asked for through its hash,
+// so the same hashes are computed once more and their time is taken off.
+import { readFileSync } from 'node:fs';
+
+const [archivePath, wasmPath, block = '1', blocks = '5'] = process.argv.slice(2);
+const archive = readFileSync(archivePath);
+const stream = archive.subarray(0, Number(archive.readBigUInt64LE(archive.length - 16)));   // the footer's offset: docs/FORMAT.md
+const module = new WebAssembly.Module(readFileSync(wasmPath));
+
+function seconds() {
+    const { user, system } = process.cpuUsage();
+    return (user + system) * 1e-6;
+}
+
+function hashAll(wasm) {
+    const hashes = [];
+    for (let i = 0; i < wasm.structures(); i++) hashes.push(wasm.mesh_hash(i));
+    return hashes.join();
+}
+
+function decode(wasm) {
+    const check = (what, status) => {
+        if (status < 0) throw Error(`${what}: status ${status}`);
+        return status;
+    };
+    const at = wasm.input(stream.length);
+    new Uint8Array(wasm.memory.buffer).set(stream, at);
+    check('feed', wasm.feed(stream.length));
+    while (check('step', wasm.step()) === 0);
+    return hashAll(wasm);
+}
+
+function time(count) {
+    const instances = Array.from({ length: count }, () => new WebAssembly.Instance(module, {}).exports);
+    const start = seconds();
+    const hashes = instances.map(decode);
+    const middle = seconds();
+    if (instances.map(hashAll).join() !== hashes.join()) throw Error('the meshes changed');
+    return (2 * middle - start - seconds()) / count;
+}
+
+time(Number(block));   // the engine compiles again what is hot
+let best = Infinity;
+for (let i = 0; i < Number(blocks); i++) best = Math.min(best, time(Number(block)));
+console.log(JSON.stringify({ seconds: best }));
