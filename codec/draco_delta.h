@@ -8,6 +8,8 @@
 enum {
     LATHE_DRACO_ONE = 8,          /* units of a voxel edge */
     LATHE_DRACO_TOLERANCE = 6553, /* lattice units: how far a vertex may lie from its place within its slice */
+    LATHE_DRACO_MIDDLE = 9830,    /* and a middle of two others, 0.15 voxel */
+    LATHE_DRACO_SLIDE = 65536,    /* and one where two outlines cross, along them */
 };
 #define LATHE_DRACO_NONE UINT32_MAX
 

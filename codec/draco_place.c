@@ -7,16 +7,17 @@
 #include <string.h>
 
 enum { UNIT = LATHE_LATTICE_ONE / LATHE_DRACO_ONE, MOST_SKIPPED = 4, NEAR = 24, FAR = 100, NOWHERE = 99, MOST_NEIGHBOURS = 16,
-       MOST_CANDIDATES = 16, MOST_RISE = 511 };
+       MOST_CANDIDATES = 16, MOST_RISE = 511, CROSSING = -1 };
 #define OLD_VERTEX INT32_MIN /* and how many of the old outline are skipped */
 #define MOST_WORK ((uint64_t)1 << 32)
 
 typedef struct place { int32_t u, v; } place;
 
-static bool is_near(const lathe_draco_walk *w, uint32_t x, place p) {
+static bool is_within(const lathe_draco_walk *w, uint32_t x, place p, int64_t tolerance) {
     int64_t du = (int64_t)p.u * UNIT - w->truth->exact[x][0], dv = (int64_t)p.v * UNIT - w->truth->exact[x][1];
-    return du * du + dv * dv <= (int64_t)LATHE_DRACO_TOLERANCE * LATHE_DRACO_TOLERANCE;
+    return du * du + dv * dv <= tolerance * tolerance;
 }
+static bool is_near(const lathe_draco_walk *w, uint32_t x, place p) { return is_within(w, x, p, LATHE_DRACO_TOLERANCE); }
 
 static int32_t rounded(int32_t lattice) {
     int32_t up = lattice + UNIT / 2;
@@ -325,7 +326,7 @@ typedef struct between {
     uint32_t count, candidate_count;
     uint32_t neighbour[MOST_NEIGHBOURS]; /* in slices */
     place candidate[MOST_CANDIDATES];
-    int64_t length[MOST_CANDIDATES];
+    int64_t length[MOST_CANDIDATES]; /* by which they are sorted; CROSSING for those */
     int32_t height;
     uint64_t key;
 } between;
@@ -368,8 +369,10 @@ static void add_crossing(const lathe_draco_walk *w, between *b, const uint32_t *
     const int32_t *a = at_of(w, p[0]), *c = at_of(w, q[0]);
     double du = at_of(w, p[1])[0] - a[0], dv = at_of(w, p[1])[1] - a[1], eu = at_of(w, q[1])[0] - c[0], ev = at_of(w, q[1])[1] - c[1];
     double turn = du * ev - dv * eu, t = (c[0] - a[0]) * ev - (c[1] - a[1]) * eu;
-    if (turn == 0 || t / turn < 0 || t / turn > 1) return;
-    add_candidate(b, (place){(int32_t)floor(a[0] + du * t / turn + 0.5), (int32_t)floor(a[1] + dv * t / turn + 0.5)}, -1);
+    if (turn == 0) return;
+    /* Within the edge, even where rounding has taken the crossing away. */
+    t = t / turn < 0.0625 ? 0.0625 : t / turn > 0.9375 ? 0.9375 : t / turn;
+    add_candidate(b, (place){(int32_t)floor(a[0] + du * t + 0.5), (int32_t)floor(a[1] + dv * t + 0.5)}, CROSSING);
 }
 
 static bool are_linked(const lathe_draco_walk *w, uint32_t a, uint32_t b) { return w->next[a] == b || w->next[b] == a; }
@@ -397,11 +400,16 @@ static void list_candidates(const lathe_draco_walk *w, uint32_t x, between *b) {
 static int32_t candidate_of(int32_t value) { return value >> 10; }
 static int32_t rise_of(int32_t value) { return (value & 1023) - 512; }
 
+/* Writing: outlines that nearly run along each other cross farther away when they move a little, but along themselves. */
+static bool is_good(const lathe_draco_walk *w, const between *b, uint32_t x, uint32_t i) {
+    return is_within(w, x, b->candidate[i], b->length[i] == CROSSING ? LATHE_DRACO_SLIDE : LATHE_DRACO_MIDDLE);
+}
+
 /* Writing: the first value in the context that is right. */
 static int32_t find_between(const lathe_draco_walk *w, const between *b, uint32_t x, int32_t rise, lathe_rank_cursor cursor) {
     int32_t value;
     for (int32_t rank = 0; lathe__rank_next(&cursor, &value); rank++)
-        if ((uint32_t)candidate_of(value) < b->candidate_count && rise_of(value) == rise && is_near(w, x, b->candidate[candidate_of(value)]))
+        if ((uint32_t)candidate_of(value) < b->candidate_count && rise_of(value) == rise && is_good(w, b, x, (uint32_t)candidate_of(value)))
             return rank;
     return -1;
 }
@@ -410,7 +418,7 @@ static void between_by_numbers(lathe_draco_walk *w, const between *b, uint32_t x
     uint32_t choice = 0;
     place expected = expect(w, x, (place){w->start[0], w->start[1]});
     for (uint32_t i = 0; w->truth && !choice && i < b->candidate_count; i++)
-        if (is_near(w, x, b->candidate[i])) choice = i + 1;
+        if (is_good(w, b, x, i)) choice = i + 1;
     choice = lathe__walk_number(w, choice);
     if (choice > b->candidate_count) { lathe__walk_fail(w, LATHE_ERR_FORMAT); return; }
     if (w->truth && !choice) *p = nearest_place(w, x);

@@ -156,6 +156,7 @@ static void mark_nesting(refinement *r, bool *found) {
         for (uint32_t l = 0; l < r->loops->loop_count && !p->split; l++) {
             if (l == p->loop) continue;
             uint32_t v = r->loops->loops[l].first;
+            while (!r->kept[v]) v++;   /* one of its contour: others may lie beyond the piece without harm, or the other way round */
             lathe_point a = r->at[v];
             if (a.x < box.x0 || a.x > box.x1 || a.y < box.y0 || a.y > box.y1) continue;
             if (cuts_off(r, p, v)) p->split = *found = true;

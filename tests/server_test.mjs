@@ -217,6 +217,8 @@ test('levels come in every format, whole or of one structure', async () => {
             const glb = await get(`/models/${several.id}/levels/${n}.glb${query}`);
             assert.equal(glb.headers['content-type'], 'model/gltf-binary');
             assert.equal(glb.body.subarray(0, 4).toString(), 'glTF');
+            const smooth = await get(`/models/${several.id}/levels/${n}.stl${query}${query ? '&' : '?'}smooth=2`);
+            assert.equal(smooth.body.readUInt32LE(80), 4 * (await get(`/models/${several.id}/levels/${n}.stl${query}`)).body.readUInt32LE(80));
             const stl = await get(`/models/${several.id}/levels/${n}.stl${query}`);
             assert.equal(stl.headers['content-type'], 'model/stl');
             assert.equal(stl.body.length, 84 + 50 * stl.body.readUInt32LE(80));
@@ -559,6 +561,7 @@ test('what is not there', async () => {
 
 test('arguments that are none', async () => {
     const { id, levels } = model;
+    for (const smooth of ['0', '9', 'x', '']) isProblem(await get(`/models/${id}/levels/0.glb?smooth=${smooth}`), 400, /smooth/);
     for (const query of ['from=x', 'from=-1', 'from=', 'to=1.5', 'from=1&to=0', `from=${levels + 1}`, 'from=99999999999999999999', 'structure=',
         'from=0&from=1', 'structure=a&structure=b', 'structure=%00', 'structure=%', 'structure=%4', 'from=0x1', 'from=+1',
         `${'a&'.repeat(17)}`])

@@ -33,7 +33,7 @@ exits 2
 exits 0 --help; prints "lathe COMMAND"
 exits 0 --version; prints "^lathe [0-9]"
 exits 2 nonsense; says "no such command"
-for command in bake serve info export verify bench hash reconstruct; do exits 0 $command --help; prints "^Usage: lathe $command"; done
+for command in bake serve info export verify bench hash reconstruct draw; do exits 0 $command --help; prints "^Usage: lathe $command"; done
 exits 2 bake
 exits 2 info
 exits 2 info a b
@@ -126,6 +126,12 @@ ok "STL has 84 + 50 n bytes" test "$(stat -c %s "$here/ring.stl")" = $((84 + 50 
 ok "PLY" grep -aq "^ply" "$here/ring.ply"
 ok "GLB" grep -aq "^glTF" "$here/ring.glb"
 ok "Draco" grep -aq "^DRACO" "$here/ring.drc"
+exits 0 export "$here/labels.lathe" --level 0 -o "$here/flat.stl"
+exits 0 export "$here/labels.lathe" --level 0 --smooth 3 -o "$here/smooth.stl"
+flat=$(od -An -tu4 -j 80 -N 4 "$here/flat.stl"); smooth=$(od -An -tu4 -j 80 -N 4 "$here/smooth.stl")
+ok "--smooth 3 cuts every triangle into nine" test $((flat * 9)) = $((smooth))
+exits 2 export "$here/labels.lathe" --smooth 0 -o "$here/no.stl"; says "1 to 16"
+exits 2 export "$here/labels.lathe" --smooth 17 -o "$here/no.stl"; says "1 to 16"
 exits 1 export "$here/labels.lathe" --level 99 -o "$here/no.stl"; says "the last one is"
 exits 2 export "$here/labels.lathe" --level -1 -o "$here/no.stl"
 exits 1 export "$here/labels.lathe" --structure nobody -o "$here/no.stl"; says "no structure"

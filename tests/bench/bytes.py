@@ -326,7 +326,7 @@ def introduction(effort):
 def markdown(results, rows, effort, pictures):
     lines = ["# Bytes over error", "", *introduction(effort), "", "## The figures", "", *figure_table(rows)]
     for name, r in results.items():
-        lines += ["", f"## {name}", ""]
+        lines += ["", f"## {name}", "", *([volumes.ABOUT[name], ""] if name in volumes.ABOUT else [])]
         if pictures: lines += [f"![bytes over error](img/bytes_{name}.svg)", ""]
         lines += [*level_table(r), "", *error_table(r)]
     return "\n".join(lines) + "\n"

@@ -188,7 +188,17 @@ def torso(slices=144):
 
 # ---- all of them -------------------------------------------------------------------------------------------------------
 
-NAMES = ("ch2bet", "aal", "torso", "xcolumn", "head", "thalamus")
+ABOUT = {
+    "ch2bet": "A brain, mricron-data's ch2bet at 46.5, against its trilinear isosurface.",
+    "aal": "116 labels of an atlas, each against the isosurface of its own 0/1 mask at 0.5; one mesh for all.",
+    "torso": "Computed: a trunk with waist and shoulders, and in it a vessel that parts into two, as a cavity. Grey values of signed "
+             "distance, against their trilinear isosurface.",
+    "xcolumn": "Computed: two crossed bars, 60 x 14 voxels, that turn by 3 degrees a slice for 96 slices. As above.",
+    "head": "mricron-data's ch2 at 30: the outermost crossing on each of 256 rays of each slice, lightly smoothed, made a volume of "
+            "signed distances; against the dense polar mesh of the radii.",
+    "thalamus": "Label 77 of the atlas made a star in the same way, 128 rays.",
+}
+NAMES = tuple(ABOUT)
 
 
 def open_volume(name, folder):
