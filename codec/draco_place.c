@@ -347,7 +347,7 @@ static void gather(const lathe_draco_walk *w, uint32_t x, between *b) {
     }
     b->key = (end - first < 15 ? end - first : 15) << 16 | side[0] << 8 | side[1];
     const lathe_draco_part *part = &w->mesh->parts[w->part[x]];
-    int32_t slice = (w->half[x] - 1) / 2 - (w->half[x] < 0);
+    int32_t slice = (w->half[x] - 1) / 2;
     b->height = (height_of(part, slice) + height_of(part, slice + 1)) * (LATHE_DRACO_ONE / 2);
 }
 

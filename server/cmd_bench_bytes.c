@@ -67,7 +67,8 @@ static int bake_timed(stage_clock *clock, lathe_bake_arguments *a, const char *p
 typedef struct level_row {
     const lathe_level_info *info;
     uint64_t payload, fetched;     /* bytes of packets alone; with header, record head and checksums */
-    uint64_t draco, draco_delta;   /* of the whole level; 0: there is none */
+    uint64_t draco, draco_delta;   /* of the whole level; from the level before */
+    bool delta_failed;
     uint32_t packets;
 } level_row;
 
@@ -162,6 +163,11 @@ static lathe_status measure_level(bytes_report *report, const lathe_model *model
     if (!status && folder && !dump_mesh(&mesh, folder, level))
         status = lathe_fail(err, LATHE_ERR_IO, "%s/level%u.mesh: %s", folder, level, strerror(errno));
     lathe_world_mesh_free(&mesh);
+    /* A model without Draco deltas still has all the other figures. */
+    if (!status && lathe_write_draco_delta(model, -1, level, count_sink, &row->draco_delta, err)) {
+        fprintf(stderr, "lathe: bench: level %u: its Draco delta: %s\n", level, err->text);
+        row->delta_failed = true;
+    }
     return status;
 }
 
@@ -200,7 +206,7 @@ static void print_text(const bytes_report *report, const stage_clock *clock, con
         number_or_dash(bits, bits_each(report, i), "%.3f");
         number_or_dash(rms, (double)row->info->error_rms_mm / report->voxel, "%.3f");
         number_or_dash(most, (double)row->info->error_max_mm / report->voxel, "%.3f");
-        number_or_dash(delta, row->draco_delta ? (double)row->draco_delta : -1, "%.0f");
+        number_or_dash(delta, row->delta_failed ? -1 : (double)row->draco_delta, "%.0f");
         stream += row->fetched;
         printf("%5u %9llu %9llu %9llu %11s %11llu %9u %9s %8s %8s\n", i, (unsigned long long)row->payload,
                (unsigned long long)(row->fetched - row->payload), (unsigned long long)stream, delta, (unsigned long long)row->draco,
@@ -220,7 +226,7 @@ static json_t *json_row(const bytes_report *report, uint32_t i) {
     double bits = bits_each(report, i);
     return json_pack("{s:I, s:I, s:I, s:I, s:I, s:o, s:I, s:I, s:I, s:o, s:o, s:o}", "level", (json_int_t)i, "packets", (json_int_t)row->packets,
                      "payload", (json_int_t)row->payload, "fetched", (json_int_t)row->fetched, "draco", (json_int_t)row->draco,
-                     "draco_delta", row->draco_delta ? json_integer((json_int_t)row->draco_delta) : json_null(), "vertices",
+                     "draco_delta", row->delta_failed ? json_null() : json_integer((json_int_t)row->draco_delta), "vertices",
                      (json_int_t)row->info->vertices, "new_vertices", (json_int_t)new_vertices(report, i), "triangles",
                      (json_int_t)row->info->triangles, "bits_per_new_vertex", bits < 0 ? json_null() : json_real(bits), "rms",
                      error_or_null(row->info->error_rms_mm, report->voxel), "max", error_or_null(row->info->error_max_mm, report->voxel));

@@ -258,6 +258,57 @@ static void write_anew(const char *name, const char *computed) {
     printf("%s written\n", path);
 }
 
+/* ---- one structure of many ---- */
+
+static int append(void *context, const void *bytes, size_t size) {
+    lathe__emit(context, bytes, size);
+    return 0;
+}
+
+static lathe_decoder *decode_all(const uint8_t *bytes, size_t size) {
+    lathe_decoder *decoder;
+    lathe_step step;
+    lathe_status status;
+    if (lathe_decoder_open(&decoder) || lathe_decoder_feed(decoder, bytes, size)) abort();
+    lathe_decoder_build_meshes(decoder, false);
+    while (!(status = lathe_decoder_step(decoder, &step))) {}
+    CHECK_EQ(status, LATHE_MORE);
+    return decoder;
+}
+
+static bool same_content(const lathe_structure_state *a, const lathe_structure_state *b) {
+    if (a->level != b->level || a->fraction != b->fraction || !a->radii != !b->radii || !a->mask.bits != !b->mask.bits) return false;
+    if (a->radii) {
+        size_t rows = (size_t)a->radii->slices, samples = rows * a->radii->rays;
+        return a->radii->rays == b->radii->rays && a->radii->turn == b->radii->turn && !memcmp(a->radii->apex, b->radii->apex, sizeof a->radii->apex) &&
+               !memcmp(a->radii->centre, b->radii->centre, rows * sizeof *a->radii->centre) &&
+               !memcmp(a->radii->radius, b->radii->radius, samples * sizeof *a->radii->radius);
+    }
+    size_t bytes = lathe__mask_slice_words(&a->mask) * sizeof(uint64_t) * (size_t)a->mask.size[2];
+    return a->mask.bits && !memcmp(a->mask.size, b->mask.size, sizeof a->mask.size) && !memcmp(a->mask.bits, b->mask.bits, bytes);
+}
+
+/* The stream of a structure alone, coded anew if its model is shared, decodes to what the structure is in the whole. */
+static void every_structure_alone(const char *name, const file *f) {
+    records r;
+    lathe_header header = find_records(&r, f);
+    lathe__header_free(&header);
+    lathe_model *model;
+    if (lathe_model_parse(&model, f->bytes, f->size, NULL)) abort();
+    lathe_decoder *whole = decode_all(f->bytes, r.stream);
+    for (uint32_t i = 0; i < lathe_decoder_structures(whole); i++) {
+        lathe_bytes stream = {0};
+        CHECK(!lathe_model_stream(model, i, 0, LATHE_MAX_LEVELS, append, &stream));
+        lathe_decoder *one = decode_all(stream.data, stream.size);
+        CHECK_EQ(lathe_decoder_structures(one), 1);
+        if (!CHECK(same_content(lathe__decoder_state(one, 0), lathe__decoder_state(whole, i)))) fprintf(stderr, "%s, structure %u\n", name, i);
+        lathe_decoder_close(&one);
+        lathe__bytes_free(&stream);
+    }
+    lathe_decoder_close(&whole);
+    lathe_model_close(&model);
+}
+
 /* ---- cut short ---- */
 
 /* One decoder is fed byte by byte: after each byte it stands where a decoder of that prefix stands. */
@@ -387,6 +438,7 @@ int main(int argc, char **argv) {
         CHECK(f.size > 0 && f.size <= 8192);
         decode(packets, meshes, name, &f);
         if (!anew) {
+            every_structure_alone(name, &f);
             every_prefix(&f);
             every_short_archive(&f);
             every_flipped_bit(&f);
