@@ -132,37 +132,8 @@ static bool apart_meet(const point p[3], const point q[3]) {
     return false;
 }
 
-/* Corner 0 of both is shared. Seen along an axis, do they lie beside each other in one half-plane? Then they share nothing else. In a
- * fan of many triangles nearly all pairs do, and this is a fifth of the time that signs of volumes take. Differences are exact
- * doubles, so a difference of products errs by less than 2^-51 of their sizes. */
-static bool are_beside(const point p[3], const point q[3]) {
-    double a[2][3], b[2][3];
-    for (int k = 0; k < 2; k++)
-        for (int i = 0; i < 3; i++) {
-            a[k][i] = (double)p[k + 1][i] - p[0][i];
-            b[k][i] = (double)q[k + 1][i] - q[0][i];
-        }
-    for (int i = 0; i < 3; i++) {
-        int up = (a[0][i] > 0) + (a[1][i] > 0) + (b[0][i] > 0) + (b[1][i] > 0);
-        int down = (a[0][i] < 0) + (a[1][i] < 0) + (b[0][i] < 0) + (b[1][i] < 0);
-        if (up != 4 && down != 4) continue;
-        for (int j = 0; j < 3; j++) {
-            int left = 0, right = 0;
-            for (int k = 0; k < 4 && j != i; k++) {
-                double f = a[k & 1][i] * b[k >> 1][j], g = a[k & 1][j] * b[k >> 1][i], slack = 0x1p-50 * (fabs(f) + fabs(g));
-                left += f - g > slack;
-                right += g - f > slack;
-                if (left && right) break;
-            }
-            if (left == 4 || right == 4) return true;
-        }
-    }
-    return false;
-}
-
 /* Corner 0 of both is shared. What they share beyond it reaches along a ray from it to the opposite edge of one of them. */
 static bool at_corner_meet(const point p[3], const point q[3]) {
-    if (are_beside(p, q)) return false;
     int p1 = lathe__orient3d(q[0], q[1], q[2], p[1]), p2 = lathe__orient3d(q[0], q[1], q[2], p[2]);
     if (p1 * p2 > 0) return false;
     int q1 = lathe__orient3d(p[0], p[1], p[2], q[1]), q2 = lathe__orient3d(p[0], p[1], p[2], q[2]);

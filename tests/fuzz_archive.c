@@ -14,10 +14,12 @@ static void use_model(const lathe_model *model) {
     if (!info->structure_count || !info->level_count) abort();
     lathe_error err = {{0}};
     if (lathe_model_check(model, &err) && !err.text[0]) abort();
-    for (uint32_t i = 0; i < info->structure_count && i < 8; i++) {
+    /* Where structures share a model, each is decoded with all before it and coded again. */
+    uint32_t most = info->independent ? 8 : 1;
+    for (uint32_t i = 0; i < info->structure_count && i < most; i++) {
         if (lathe_model_find(model, info->structures[i].name) != (int64_t)i) abort();
         uint64_t size = 0;
-        if (!lathe_model_stream(model, i, 0, LATHE_MAX_LEVELS, count_bytes, &size) &&
+        if (!lathe_model_stream(model, i, 0, LATHE_MAX_LEVELS, count_bytes, &size) && info->independent &&
             size != lathe_model_stream_size(model, i, 0, LATHE_MAX_LEVELS)) abort();
     }
     lathe_world_mesh mesh;

@@ -2,7 +2,7 @@
 """Bytes over error: Lathe's stream against what somebody would send instead, on the same volumes, in the same run.
 
   bytes.py [--lathe build/lathe] [--wasm build/wasm/lathe.wasm] [--tools build/release/tests/bench/peers] [--volumes NAME,...]
-           [--volume FILE [--iso V]] [--reuse JSON] [--quick] [--json FILE] [--markdown FILE] [--plots DIR] [--strict]
+           [--volume FILE [--iso V]] [--peers JSON] [--quick] [--json FILE] [--markdown FILE] [--plots DIR] [--strict]
 
 Errors are two-sided RMS in voxels against a reference surface, the worse direction, measured by VTK. Bytes of Lathe are all that a
 client has fetched when it stands at the error: header, heads of level records, packets, checksums. It may stop after any packet.
@@ -130,7 +130,8 @@ def wasm_ratio(archive, lathe, wasm, seconds):
     return min(browser) / min(native)
 
 
-def measure(name, volume, arguments, effort, folder):
+def measure(volume, arguments, effort, folder, known):
+    """known: an earlier result, whose peers and mask are taken; or None"""
     started = time.time()
     small = volume.kind != "folded"
     reference = distance.Reference(volume.reference(), volume.voxel)
@@ -138,7 +139,7 @@ def measure(name, volume, arguments, effort, folder):
     curve = Curve(stream, reference, effort.samples)
     curve.measure(effort.processes)
     reached = {target: curve.reach(target) for target in TARGETS}
-    rows = peers.sweep(reference, arguments.tools, folder, effort.peer_samples, effort.step, effort.quadric, effort.processes)
+    rows = known["peers"] if known else peers.sweep(reference, arguments.tools, folder, effort)
     result = {"kind": volume.kind, "voxel_mm": volume.voxel, "reference_triangles": reference.surface.GetNumberOfPolys(),
               "levels": stream.levels, "decode": stream.report["decode"], "bake_cpu_seconds": stream.report["bake_cpu_seconds"]}
     for level, end in zip(result["levels"], stream.ends):
@@ -148,7 +149,7 @@ def measure(name, volume, arguments, effort, folder):
     result["reached"] = {key(t): next(s for s in result["stream"] if s["packet"] == p) if p is not None else None for t, p in reached.items()}
     result["peers"] = sorted(rows, key=lambda r: r["bytes"])
     result["best_peer"] = {key(t): peers.smallest(rows, t) for t in TARGETS}
-    result["mask"] = peers.mask(volume, reference, arguments.tools, folder, effort.samples)
+    result["mask"] = known["mask"] if known else peers.mask(volume, reference, arguments.tools, folder, effort.samples)
     result["wasm_ratio"] = wasm_ratio(stream.archive, arguments.lathe, arguments.wasm, result["decode"]["seconds"])
     result["curves"] = curves(curve.points(), rows, result["mask"])
     result["seconds"] = round(time.time() - started, 1)
@@ -350,7 +351,8 @@ def parse_arguments():
     p.add_argument("--volumes", help=f"some of {','.join(volumes.NAMES)}")
     p.add_argument("--volume", help="another volume: NIfTI, or the sidecar of a raw one")
     p.add_argument("--iso", type=float, help="its threshold; without one: all labels")
-    p.add_argument("--reuse", action="append", default=[], metavar="JSON", help="volumes that --json wrote there are not measured again")
+    p.add_argument("--peers", action="append", default=[], metavar="JSON", help="what --json wrote: the peers are taken from there, Lathe alone is "
+                   "measured again")
     p.add_argument("--quick", action="store_true", help="fewer peers, fewer samples, no atlas")
     p.add_argument("--json", help="also write every figure there")
     p.add_argument("--markdown", help="also write the tables there")
@@ -369,11 +371,11 @@ def main():
     bench.RUNS = 1
     print("\n".join(introduction(effort)), flush=True)
     if arguments.plots: os.makedirs(arguments.plots, exist_ok=True)
-    known = {name: r for path in arguments.reuse for name, r in json.load(open(path))["volumes"].items()}
+    known = {name: r for path in arguments.peers for name, r in json.load(open(path))["volumes"].items()}
     with tempfile.TemporaryDirectory() as folder:
         for name, opened in chosen(arguments, effort):
             with tempfile.TemporaryDirectory() as own:
-                results[name] = known[name] if name in known else measure(name, opened(folder), arguments, effort, own)
+                results[name] = measure(opened(folder), arguments, effort, own, known.get(name))
             r = results[name]
             print("\n".join(["", title(name, r), *level_table(r), *error_table(r), f"({r['seconds']} s)"]), flush=True)
             if arguments.plots: write_text(os.path.join(arguments.plots, f"bytes_{name}.svg"), plot.svg(title(name, r), r["curves"]))

@@ -77,15 +77,15 @@ def measure_mesh(job):
     return rows
 
 
-def sweep(reference, tools, folder, samples, step, with_quadric, processes):
+def sweep(reference, tools, folder, effort):
     """Every peer: decimation x codec x quantisation, each with its bytes and two-sided error"""
-    full, wanted = os.path.join(folder, "full.mesh"), fractions(step)
+    full, wanted, samples = os.path.join(folder, "full.mesh"), fractions(effort.step), effort.peer_samples
     write_mesh(full, *arrays_of(reference.surface))
     jobs = list(lindstrom_turk(tools, full, folder, wanted))
-    if with_quadric: jobs += quadric(reference.surface, folder, wanted[1::3])
+    if effort.quadric: jobs += quadric(reference.surface, folder, wanted[1::3])
     state.update(reference=reference, samples=samples, tools=tools)
     reference.sample(samples), reference.sample(samples // 2)
-    with get_context("fork").Pool(processes) as pool: return [row for rows in pool.imap(measure_mesh, jobs, 1) for row in rows]
+    with get_context("fork").Pool(effort.processes) as pool: return [row for rows in pool.imap(measure_mesh, jobs, 1) for row in rows]
 
 
 def smallest(rows, error, what=""):

@@ -26,20 +26,23 @@ export function unpack(draco, bytes) {
     const decoder = new draco.Decoder(), mesh = new draco.Mesh(), querier = new draco.MetadataQuerier();
     const status = decoder.DecodeArrayToMesh(new Int8Array(bytes), bytes.byteLength, mesh);
     if (!status.ok()) throw Error(`Draco: ${status.error_msg()}`);
+    const copy = (size, fill) => {
+        const at = draco._malloc(size);
+        fill(size, at);
+        const bytes = draco.HEAPU8.slice(at, at + size).buffer;
+        draco._free(at);
+        return bytes;
+    };
     const values = (type) => {
-        const list = new draco.DracoInt32Array();
-        decoder.GetAttributeInt32ForAllPoints(mesh, decoder.GetAttribute(mesh, decoder.GetAttributeId(mesh, type)), list);
-        return Int32Array.from({ length: mesh.num_points() }, (_, i) => list.GetValue(i));
+        const attribute = decoder.GetAttribute(mesh, decoder.GetAttributeId(mesh, type));
+        return new Int32Array(copy(mesh.num_points() * 4, (size, at) => decoder.GetAttributeDataArrayForAllPoints(mesh, attribute, draco.DT_INT32, size, at)));
     };
     const words = (name) => {
         const list = new draco.DracoInt32Array();
         querier.GetIntEntryArray(decoder.GetMetadata(mesh), name, list);
         return Int32Array.from({ length: list.size() }, (_, i) => list.GetValue(i));
     };
-    const size = mesh.num_faces() * 12, pointer = draco._malloc(size);
-    decoder.GetTrianglesUInt32Array(mesh, size, pointer);
-    const triangles = new Uint32Array(draco.HEAPU8.slice(pointer, pointer + size).buffer);
-    draco._free(pointer);
+    const triangles = new Uint32Array(copy(mesh.num_faces() * 12, (size, at) => decoder.GetTrianglesUInt32Array(mesh, size, at)));
     const result = { triangles, slice: values(draco.POSITION), place: values(draco.GENERIC),
         numbers: new Uint8Array(words('lathe').buffer), affine: new Float64Array(words('affine').buffer) };
     for (const object of [mesh, decoder, querier]) draco.destroy(object);
@@ -48,23 +51,23 @@ export function unpack(draco, bytes) {
 
 /** Values ranked by how often a context has seen them. */
 class Ranks {
-    contexts = new Map();
-    * values(keys) {
-        const lists = keys.map((key) => this.contexts.get(key) ?? []);
-        for (const [k, list] of lists.entries())
-            for (const { value } of list) if (!lists.slice(0, k).some((before) => before.some((r) => r.value === value))) yield value;
-    }
+    contexts = new Map(); // key -> list of { value, count }, most seen first
     get(keys, rank, more = []) {
-        for (const value of this.values(keys)) if (!rank--) return value;
-        for (const value of more) if (![...this.values(keys)].includes(value) && !rank--) return value;
+        const lists = keys.map((key) => this.contexts.get(key) ?? []);
+        const isKnown = (value, until) => {
+            for (let k = 0; k < until; k++) for (const seen of lists[k]) if (seen.value === value) return true;
+            return false;
+        };
+        for (let k = 0; k < lists.length; k++) for (const { value } of lists[k]) if (!isKnown(value, k) && !rank--) return value;
+        for (const value of more) if (!isKnown(value, lists.length) && !rank--) return value;
         throw Error('no such rank');
     }
     seen(keys, value) {
         for (const key of keys) {
-            if (!this.contexts.has(key)) this.contexts.set(key, []);
-            const list = this.contexts.get(key);
-            let i = list.findIndex((r) => r.value === value);
-            if (i < 0) list[i = Math.min(list.length, MOST_VALUES - 1)] = { value, count: 0 };
+            let list = this.contexts.get(key), i = 0;
+            if (!list) this.contexts.set(key, (list = []));
+            while (i < list.length && list[i].value !== value) i++;
+            if (i === list.length) list[(i = Math.min(i, MOST_VALUES - 1))] = { value, count: 0 };
             const own = list[i];
             for (own.count++; i && list[i - 1].count < own.count; i--) list[i] = list[i - 1];
             list[i] = own;
@@ -91,9 +94,12 @@ export function applyDelta(draco, model, bytes) {
     const signed = () => { const v = number(); return v % 2 ? -(v + 1) / 2 : v / 2; };
 
     // Corners of each vertex, and across each edge the one the other way. Corner 3 t + k: the edge from there to the next corner.
-    const after = (i) => i - (i % 3) + ((i + 1) % 3), edges = new Map(), corners = Array.from({ length: count }, () => []);
-    triangles.forEach((v, i) => { corners[v].push(i); edges.set(v * count + triangles[after(i)], i); });
-    const across = (i) => edges.get(triangles[after(i)] * count + triangles[i]);
+    const after = (i) => i - (i % 3) + ((i + 1) % 3), corners = Array.from({ length: count }, () => []);
+    triangles.forEach((v, i) => corners[v].push(i));
+    const across = (i) => {
+        for (const j of corners[triangles[after(i)]]) if (triangles[after(j)] === triangles[i]) return j;
+        throw Error('the mesh is not closed');
+    };
 
     // ---- in which slice each vertex lies: 2 i in shown slice i of its structure, odd between two
     const half = new Int32Array(count).fill(UNKNOWN), part = new Int32Array(count), changed = new Set();
@@ -134,7 +140,7 @@ export function applyDelta(draco, model, bytes) {
             if (half[x] === UNKNOWN) {
                 const base = flat(a, b) ? half[a] - (half[y] > half[a] ? 2 : 0) : low - (low & 1);
                 const key = [half[a] - base, half[b] - base, flat(a, b) ? 3 : half[y] - base, open(a, base, follow, precede),
-                    open(b, base, precede, follow), Math.min(corners[x].length, 12)].join();
+                    open(b, base, precede, follow), Math.min(corners[x].length, 12)].reduce((all, v) => all * 16 + v);
                 const value = slices.get([key], slice[x], [0, 1, 2]);
                 slices.seen([key], value);
                 half[x] = base + value;
@@ -178,7 +184,7 @@ export function applyDelta(draco, model, bytes) {
         do {
             const expected = [here[0] + step[0], here[1] + step[1]], symbol = place[x], before = latest;
             const wait = latest === NONE || next[latest] === NONE ? [99, 99] : waiting([0, 1].map((k) => at[3 * next[latest] + k] - here[k]));
-            const keys = [`${step},${wait}`, `${step}`, ''];
+            const last = (step[0] & 0xffff) * 65536 + (step[1] & 0xffff), keys = [last * 65536 + (wait[0] & 255) * 256 + (wait[1] & 255), -1 - last, NaN];
             let there, value;
             if (x === start) there = byNumbers(x, mean(x, begin));
             else if (symbol >= PAIR) there = unpair(symbol - PAIR).map((d, k) => expected[k] + d);
@@ -224,7 +230,7 @@ export function applyDelta(draco, model, bytes) {
             const [p, q] = [xy(a), xy(b)];
             put((p[0] + q[0]) >> 1, (p[1] + q[1]) >> 1, (p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2);
         }));
-        const key = [[Math.min(corners[x].length, 15), lower.length, upper.length].join()];
+        const key = [(Math.min(corners[x].length, 15) * 32 + lower.length) * 32 + upper.length];
         let value;
         if (place[x] >= RANK) value = between.get(key, place[x] - RANK);
         else {
