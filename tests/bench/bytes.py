@@ -139,7 +139,7 @@ def measure(volume, arguments, effort, folder, known):
     curve = Curve(stream, reference, effort.samples)
     curve.measure(effort.processes)
     reached = {target: curve.reach(target) for target in TARGETS}
-    rows = known["peers"] if known else peers.sweep(reference, arguments.tools, folder, effort)
+    rows = known["peers"] if known else peers.sweep(reference, arguments.tools, folder, effort, TARGETS)
     result = {"kind": volume.kind, "voxel_mm": volume.voxel, "reference_triangles": reference.surface.GetNumberOfPolys(),
               "levels": stream.levels, "decode": stream.report["decode"], "bake_cpu_seconds": stream.report["bake_cpu_seconds"]}
     for level, end in zip(result["levels"], stream.ends):

@@ -6,6 +6,7 @@ import bench
 from bytes_distance import arrays_of, read_mesh, write_mesh
 
 WORST, BEST = 4.0, 0.05     # voxels: decimated meshes outside are left out
+SPACING = 3                 # of so many decimated meshes one is measured, all of them near a target
 LADDER = (4.0, 2.0, 1.0, 0.5, 0.25, 0.125)   # errors of the levels that a chain of meshes would have
 state = {}                  # what forked workers inherit
 
@@ -27,7 +28,7 @@ def tool(folder, name, *arguments):
 def lindstrom_turk(tools, mesh, folder, wanted):
     last = math.inf
     for row in tool(tools, "lindstrom_turk", mesh, os.path.join(folder, "turk"), ",".join(f"{f:.6g}" for f in wanted)):
-        if row["triangles"] > 0.98 * last: return      # nothing more can be collapsed
+        if row["triangles"] >= last: return      # nothing more can be collapsed
         last = row["triangles"]
         yield "Lindstrom-Turk", row["fraction"], row["path"]
 
@@ -77,15 +78,27 @@ def measure_mesh(job):
     return rows
 
 
-def sweep(reference, tools, folder, effort):
-    """Every peer: decimation x codec x quantisation, each with its bytes and two-sided error"""
-    full, wanted, samples = os.path.join(folder, "full.mesh"), fractions(effort.step), effort.peer_samples
+def near_targets(rows, jobs, targets):
+    """Of finely spaced decimated meshes those beside the best ones so far, so that no peer loses by the spacing"""
+    at = {job[1]: i for i, job in enumerate(jobs)}
+    found = set()
+    for best in filter(None, (smallest(rows, t, what) for t in targets for what in ("Lindstrom-Turk + Draco", "Lindstrom-Turk + meshopt"))):
+        found |= {at[best["fraction"]] + offset for offset in (-1, 1, 2)}
+    return [jobs[i] for i in sorted(found) if i % SPACING and i < len(jobs)]
+
+
+def sweep(reference, tools, folder, effort, targets):
+    """Every peer: decimation x codec x quantisation, each with its bytes and two-sided error; closer together at the targets"""
+    full, samples = os.path.join(folder, "full.mesh"), effort.peer_samples
     write_mesh(full, *arrays_of(reference.surface))
-    jobs = list(lindstrom_turk(tools, full, folder, wanted))
-    if effort.quadric: jobs += quadric(reference.surface, folder, wanted[1::3])
+    turk = list(lindstrom_turk(tools, full, folder, fractions(effort.step ** (1 / SPACING))))
+    jobs = turk[::SPACING]
+    if effort.quadric: jobs += quadric(reference.surface, folder, fractions(effort.step)[1::3])
     state.update(reference=reference, samples=samples, tools=tools)
     reference.sample(samples), reference.sample(samples // 2)
-    with get_context("fork").Pool(effort.processes) as pool: return [row for rows in pool.imap(measure_mesh, jobs, 1) for row in rows]
+    with get_context("fork").Pool(effort.processes) as pool:
+        rows = [row for found in pool.imap(measure_mesh, jobs, 1) for row in found]
+        return rows + [row for found in pool.imap(measure_mesh, near_targets(rows, turk, targets), 1) for row in found]
 
 
 def smallest(rows, error, what=""):
