@@ -5,7 +5,7 @@ struct lathe_arena_block {
     struct lathe_arena_block *next;
     size_t size;               /* bytes after the header */
 };
-enum { ALIGN = 16, HEADER = (sizeof(struct lathe_arena_block) + ALIGN - 1) / ALIGN * ALIGN, FIRST_BLOCK = 1 << 16 };
+enum { ALIGN = 16, HEADER = (sizeof(struct lathe_arena_block) + ALIGN - 1) / ALIGN * ALIGN, FIRST_BLOCK = 1 << 12 };
 
 void *lathe__arena_alloc(lathe_arena *arena, size_t count, size_t size) {
     if (size && count > (SIZE_MAX / 4) / size) return NULL;

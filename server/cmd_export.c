@@ -38,20 +38,30 @@ typedef struct export_job {
     mesh_format format;
     int bits;
     int64_t smooth;            /* pieces of an edge; 0: flat triangles */
+    bool delta;                /* what a Draco client lacks of the level; there is no mesh then */
+    const lathe_model *model;
+    int64_t structure, level;
 } export_job;
+
+static lathe_status write_job(const export_job *job, const lathe_world_mesh *mesh, const lathe_write_options *options, lathe_sink sink,
+                              void *context, lathe_error *err) {
+    if (job->delta) return lathe_write_draco_delta(job->model, job->structure, (uint32_t)job->level, sink, context, err);
+    return write_mesh(mesh, job->format, options, job->bits, sink, context);
+}
 
 static int write_output(const export_job *job, const lathe_world_mesh *mesh, const lathe_model_info *info) {
     lathe_write_options options = {.model = info, .name = info->name};
     if (strcmp(job->output, "-") == 0) {
-        lathe_status status = write_mesh(mesh, job->format, &options, job->bits, write_stdout, NULL);
+        lathe_error err = {{0}};
+        lathe_status status = write_job(job, mesh, &options, write_stdout, NULL, &err);
         if (status == LATHE_OK || ferror(stdout)) return LATHE_EXIT_OK;   /* main says what happened to stdout */
-        return lathe__status_error("export", "standard output", status, NULL);
+        return lathe__status_error("export", "standard output", status, *err.text ? &err : NULL);
     }
     lathe_error err = {{0}};
     lathe_atomic_file *file = NULL;
     lathe_status status = lathe_atomic_open(&file, job->output, &err);
     if (status) return lathe__status_error("export", job->output, status, &err);
-    status = write_mesh(mesh, job->format, &options, job->bits, lathe_atomic_write, file);
+    status = write_job(job, mesh, &options, lathe_atomic_write, file, &err);
     /* A commit after a failed write fails as well, and knows why. */
     if (status == LATHE_OK || status == LATHE_ERR_IO) {
         lathe_status committed = lathe_atomic_commit(&file, &err);
@@ -61,7 +71,7 @@ static int write_output(const export_job *job, const lathe_world_mesh *mesh, con
     return status ? lathe__status_error("export", job->output, status, &err) : LATHE_EXIT_OK;
 }
 
-static int export_level(const export_job *job, const lathe_model *model, const char *structure_name, const char *level_text) {
+static int export_level(export_job *job, const lathe_model *model, const char *structure_name, const char *level_text) {
     const lathe_model_info *info = lathe_model_describe(model);
     int64_t structure = -1, level = (int64_t)info->level_count - 1;
     if (structure_name) {
@@ -79,6 +89,8 @@ static int export_level(const export_job *job, const lathe_model *model, const c
     lathe_world_mesh mesh;
     lathe_error err = {{0}};
     memset(&mesh, 0, sizeof mesh);
+    job->model = model, job->structure = structure, job->level = level;
+    if (job->delta) return write_output(job, &mesh, info);
     lathe_status status = lathe_model_mesh(&mesh, model, structure, (uint32_t)level, &err);
     if (!status && job->smooth) {
         status = lathe_world_mesh_smooth(&mesh, (uint32_t)job->smooth);
@@ -91,11 +103,12 @@ static int export_level(const export_job *job, const lathe_model *model, const c
 
 static int run(int argc, char **argv) {
     const lathe_command *command = &lathe__command_export;
-    const char *output = NULL, *level = NULL, *structure = NULL, *format = NULL, *bits = NULL, *smooth = NULL;
+    const char *output = NULL, *level = NULL, *structure = NULL, *format = NULL, *bits = NULL, *smooth = NULL, *delta = NULL;
     const lathe_option options[] = {
         LATHE_OPTION_TEXT("output", 'o', &output),       LATHE_OPTION_TEXT("level", 'l', &level),
         LATHE_OPTION_TEXT("structure", 's', &structure), LATHE_OPTION_TEXT("format", 'f', &format),
         LATHE_OPTION_TEXT("bits", 0, &bits),             LATHE_OPTION_TEXT("smooth", 0, &smooth),
+        LATHE_OPTION_TEXT("delta", 'd', &delta),
     };
     int count, status = lathe__parse_options(command, argc, argv, options, sizeof options / sizeof *options, &count);
     if (status != LATHE_PARSED) return status;
@@ -110,6 +123,10 @@ static int run(int argc, char **argv) {
     } else if (!find_format(&job.format, format)) {
         return lathe__usage_error(command, "--format %s: it is one of stl, ply, glb, drc", format);
     }
+    if (delta && (level || bits || smooth || job.format != FORMAT_DRC))
+        return lathe__usage_error(command, "--delta N is a Draco file, without --level, --bits or --smooth");
+    job.delta = delta != NULL;
+    if (delta) level = delta;
     int64_t bit_count = 0;
     if (bits && !lathe__option_integer(&bit_count, bits, 1, 30)) return lathe__usage_error(command, "--bits %s: 1 to 30", bits);
     job.bits = (int)bit_count;
@@ -125,12 +142,13 @@ static int run(int argc, char **argv) {
 
 const lathe_command lathe__command_export = {
     "export", "write one level as STL, PLY, GLB or Draco",
-    "Usage: lathe export FILE [--level N] [--structure NAME] [--format stl|ply|glb|drc] [--smooth K] -o OUT\n\n"
+    "Usage: lathe export FILE [--level N | --delta N] [--structure NAME] [--format stl|ply|glb|drc] [--smooth K] -o OUT\n\n"
     "Writes one whole level of FILE (.lathe), in world mm (GLB: metres). OUT appears when it is complete, or not at all.\n\n"
     "  -l, --level N          0 is the base shape; default: `last`, the finest\n"
     "  -s, --structure NAME   only this one; default: all in one file\n"
     "  -f, --format F         default: what OUT ends with\n"
     "      --smooth K         the smooth surface through the vertices, every edge in K pieces (1 to 16)\n"
+    "  -d, --delta N          drc: not the level but what a client lacks of it that has the one before (docs/DRACO_DELTAS.md)\n"
     "      --bits N           drc: bits of a coordinate, 11 by default\n"
     "  -o, --output OUT       `-` is standard output\n",
     run};

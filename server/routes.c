@@ -15,6 +15,8 @@ static const route ROUTES[] = {
     {{"models", "*"}, lathe__handle_manifest},
     {{"models", "*", "levels", "*"}, lathe__handle_level},
     {{"models", "*", "deltas", "*.lathe"}, lathe__handle_delta},
+    {{"models", "*", "deltas", "*.drc"}, lathe__handle_draco_delta},
+    {{"draco", "*"}, lathe__handle_draco_page},
     {{"models", "*", "stream"}, lathe__handle_stream},
     {{"models", "*", "slices", "*.png"}, lathe__handle_slice_picture},
     {{"models", "*", "slices", "*", "outline"}, lathe__handle_slice_outline},

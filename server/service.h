@@ -178,6 +178,8 @@ enum MHD_Result lathe__handle_archive(lathe_request *request);
 enum MHD_Result lathe__handle_level(lathe_request *request);
 enum MHD_Result lathe__handle_delta(lathe_request *request);
 enum MHD_Result lathe__handle_stream(lathe_request *request);
+enum MHD_Result lathe__handle_draco_delta(lathe_request *request);
+enum MHD_Result lathe__handle_draco_page(lathe_request *request);
 enum MHD_Result lathe__handle_slice_picture(lathe_request *request);
 enum MHD_Result lathe__handle_slice_outline(lathe_request *request);
 enum MHD_Result lathe__handle_slice_contour(lathe_request *request);
@@ -193,4 +195,6 @@ lathe_status lathe__json_write(lathe_buffer *out, json_t *json);
 
 extern const unsigned char lathe_viewer_html[];
 extern const size_t lathe_viewer_html_size;
+extern const unsigned char lathe_draco_html[];
+extern const size_t lathe_draco_html_size;
 #endif

@@ -189,13 +189,13 @@ static void cheap_stars(void) {
     emit_header(&stream, &one, 1, LATHE_FLAG_EXACT);
     emit_level(&stream, 0, &payload, 1);
     size_t plan = SLICES * (1 + sizeof(int32_t) + sizeof(lathe_star_slice));
-    check_bound("stars", peak_of(&stream, stream.size, &steps, false), 4400 * payload.size + (128 << 10) + plan + waiting(stream.size) + 1024, 0.4);
+    check_bound("stars", peak_of(&stream, stream.size, &steps, false), 4400 * payload.size + (8 << 10) + plan + waiting(stream.size) + 1024, 0.4);
     CHECK_EQ(steps, 1);
     lathe__bytes_free(&stream);
     lathe__bytes_free(&payload);
 }
 
-/* One small packet each: 64 KiB for each structure. */
+/* One small packet each: 4 KiB for each structure. */
 static void many_stars(void) {
     enum { COUNT = 2000 };
     static lathe_header_structure list[COUNT];
@@ -205,7 +205,7 @@ static void many_stars(void) {
     emit_zeros(&payload, 8);   /* one star like the first guess */
     emit_header(&stream, list, COUNT, LATHE_FLAG_EXACT);
     emit_level(&stream, 0, &payload, COUNT);
-    check_bound("many base shapes", peak_of(&stream, stream.size, &steps, false), COUNT * ((64 << 10) + 600) + waiting(stream.size), 0.9);
+    check_bound("many base shapes", peak_of(&stream, stream.size, &steps, false), COUNT * ((4 << 10) + 600) + waiting(stream.size), 0.9);
     CHECK_EQ(steps, COUNT);
     lathe__bytes_free(&stream);
     lathe__bytes_free(&payload);
@@ -258,7 +258,7 @@ static void empty_slices(void) {
     emit_zeros(&payload, 512);   /* a star in each slice */
     emit_header(&stream, &large, 1, LATHE_FLAG_EXACT);
     emit_level(&stream, 0, &payload, 1);
-    check_bound("a box not yet there", peak_of(&stream, stream.size, &steps, false), 200 << 10, 0.3);
+    check_bound("a box not yet there", peak_of(&stream, stream.size, &steps, false), 48 << 10, 0.3);
     CHECK_EQ(steps, 1);
     lathe__bytes_free(&stream);
     emit_header(&stream, &one, 1, LATHE_FLAG_EXACT);

@@ -32,7 +32,6 @@ class Effort:
         self.samples = 40_000 if quick else 100_000        # points on each surface, for Lathe
         self.peer_samples = 12_000 if quick else 20_000    # for each of the many peers
         self.step = 0.5 if quick else 0.72                 # from one decimated mesh to the next
-        self.quadric = not quick
         self.names = ("ch2bet", "torso", "xcolumn", "head", "thalamus") if quick else volumes.NAMES
         self.processes = min(4, os.cpu_count() or 1)
 

@@ -7,6 +7,7 @@ from bytes_distance import arrays_of, read_mesh, write_mesh
 
 WORST, BEST = 4.0, 0.05     # voxels: decimated meshes outside are left out
 SPACING = 3                 # of so many decimated meshes one is measured, all of them near a target
+LARGE = 200_000             # triangles of a large surface
 LADDER = (4.0, 2.0, 1.0, 0.5, 0.25, 0.125)   # errors of the levels that a chain of meshes would have
 state = {}                  # what forked workers inherit
 
@@ -78,27 +79,36 @@ def measure_mesh(job):
     return rows
 
 
-def near_targets(rows, jobs, targets):
+def near_targets(rows, meshes, targets):
     """Of finely spaced decimated meshes those beside the best ones so far, so that no peer loses by the spacing"""
-    at = {job[1]: i for i, job in enumerate(jobs)}
     found = set()
-    for best in filter(None, (smallest(rows, t, what) for t in targets for what in ("Lindstrom-Turk + Draco", "Lindstrom-Turk + meshopt"))):
-        found |= {at[best["fraction"]] + offset for offset in (-1, 1, 2)}
-    return [jobs[i] for i in sorted(found) if i % SPACING and i < len(jobs)]
+    for how, jobs in meshes.items():
+        at = {fraction: i for i, (_, fraction, _) in enumerate(jobs)}
+        for best in filter(None, (smallest(rows, target, f"{how} + {codec}") for target in targets for codec in ("Draco", "meshopt"))):
+            beside = (at[best["fraction"]] + offset for offset in (-1, 1, 2))
+            found |= {jobs[i] for i in beside if 0 < i < len(jobs) and i % SPACING}
+    return sorted(found)
+
+
+def decimations(reference, tools, folder, step):
+    """{how: [(how, fraction, path)]} with fractions falling. Quadric decimation of large surfaces is slow and never the best
+    there: it is not followed closely"""
+    full, fine = os.path.join(folder, "full.mesh"), fractions(step ** (1 / SPACING))
+    write_mesh(full, *arrays_of(reference.surface))
+    small = reference.surface.GetNumberOfPolys() < LARGE
+    return {"Lindstrom-Turk": list(lindstrom_turk(tools, full, folder, fine)),
+            "quadric": list(quadric(reference.surface, folder, fine if small else fine[::SPACING]))}
 
 
 def sweep(reference, tools, folder, effort, targets):
     """Every peer: decimation x codec x quantisation, each with its bytes and two-sided error; closer together at the targets"""
-    full, samples = os.path.join(folder, "full.mesh"), effort.peer_samples
-    write_mesh(full, *arrays_of(reference.surface))
-    turk = list(lindstrom_turk(tools, full, folder, fractions(effort.step ** (1 / SPACING))))
-    jobs = turk[::SPACING]
-    if effort.quadric: jobs += quadric(reference.surface, folder, fractions(effort.step)[1::3])
+    samples, meshes = effort.peer_samples, decimations(reference, tools, folder, effort.step)
     state.update(reference=reference, samples=samples, tools=tools)
     reference.sample(samples), reference.sample(samples // 2)
     with get_context("fork").Pool(effort.processes) as pool:
-        rows = [row for found in pool.imap(measure_mesh, jobs, 1) for row in found]
-        return rows + [row for found in pool.imap(measure_mesh, near_targets(rows, turk, targets), 1) for row in found]
+        measured = lambda jobs: [row for found in pool.imap(measure_mesh, jobs, 1) for row in found]
+        rows = measured([job for jobs in meshes.values() for job in jobs[::SPACING]])
+        return rows + measured(near_targets(rows, meshes, targets))
 
 
 def smallest(rows, error, what=""):
