@@ -7,7 +7,7 @@
 
 enum {
     LATHE_DRACO_ONE = 8,          /* units of a voxel edge */
-    LATHE_DRACO_TOLERANCE = 6553, /* lattice units: how far a vertex may lie from its place within its slice */
+    LATHE_DRACO_TOLERANCE = 5800, /* lattice units, 0.0885 voxel: how far a vertex may lie from its place within its slice */
     LATHE_DRACO_MIDDLE = 9830,    /* and a middle of two others, 0.15 voxel */
     LATHE_DRACO_SLIDE = 65536,    /* and one where two outlines cross, along them */
 };
@@ -46,5 +46,4 @@ typedef struct lathe_draco_truth {
  * everything is given. The mesh moves to the next level. */
 lathe_status lathe__draco_walk(lathe_draco_mesh *mesh, lathe_draco_carrier *carrier, const lathe_draco_truth *truth);
 
-/* A level's vertices as the deltas leave them, of one structure: for tests. */
 #endif

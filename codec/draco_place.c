@@ -322,11 +322,16 @@ static void walk_outline(lathe_draco_walk *w, uint32_t from) {
 
 /* ---- between slices ---- */
 
+typedef struct candidate {
+    place at;
+    int64_t length;            /* by which they are sorted; CROSSING for those */
+    uint32_t lower[2], upper[2]; /* the edges that cross */
+} candidate;
+
 typedef struct between {
     uint32_t count, candidate_count;
     uint32_t neighbour[MOST_NEIGHBOURS]; /* in slices */
-    place candidate[MOST_CANDIDATES];
-    int64_t length[MOST_CANDIDATES]; /* by which they are sorted; CROSSING for those */
+    candidate candidate[MOST_CANDIDATES];
     int32_t height;
     uint64_t key;
 } between;
@@ -353,15 +358,11 @@ static void gather(const lathe_draco_walk *w, uint32_t x, between *b) {
 
 static const int32_t *at_of(const lathe_draco_walk *w, uint32_t x) { return w->mesh->at[w->id[x]]; }
 
-static void add_candidate(between *b, place p, int64_t length) {
+static void add_candidate(between *b, candidate c) {
     if (b->candidate_count == MOST_CANDIDATES) return;
     uint32_t i = b->candidate_count++;
-    for (; i && b->length[i - 1] > length; i--) {
-        b->candidate[i] = b->candidate[i - 1];
-        b->length[i] = b->length[i - 1];
-    }
-    b->candidate[i] = p;
-    b->length[i] = length;
+    for (; i && b->candidate[i - 1].length > c.length; i--) b->candidate[i] = b->candidate[i - 1];
+    b->candidate[i] = c;
 }
 
 /* Where edges of two outlines cross. Whole numbers below 2^53, then one division: all clients find the same. */
@@ -372,7 +373,8 @@ static void add_crossing(const lathe_draco_walk *w, between *b, const uint32_t *
     if (turn == 0) return;
     /* Within the edge, even where rounding has taken the crossing away. */
     t = t / turn < 0.0625 ? 0.0625 : t / turn > 0.9375 ? 0.9375 : t / turn;
-    add_candidate(b, (place){(int32_t)floor(a[0] + du * t + 0.5), (int32_t)floor(a[1] + dv * t + 0.5)}, CROSSING);
+    add_candidate(b, (candidate){.at = {(int32_t)floor(a[0] + du * t + 0.5), (int32_t)floor(a[1] + dv * t + 0.5)},
+                                 .length = CROSSING, .lower = {p[0], p[1]}, .upper = {q[0], q[1]}});
 }
 
 static bool are_linked(const lathe_draco_walk *w, uint32_t a, uint32_t b) { return w->next[a] == b || w->next[b] == a; }
@@ -393,16 +395,28 @@ static void list_candidates(const lathe_draco_walk *w, uint32_t x, between *b) {
             if (w->half[n[i]] != w->half[n[k]] || are_linked(w, n[i], n[k])) continue;
             const int32_t *p = at_of(w, n[i]), *q = at_of(w, n[k]);
             int64_t du = p[0] - q[0], dv = p[1] - q[1];
-            add_candidate(b, (place){(p[0] + q[0]) >> 1, (p[1] + q[1]) >> 1}, du * du + dv * dv);
+            add_candidate(b, (candidate){.at = {(p[0] + q[0]) >> 1, (p[1] + q[1]) >> 1}, .length = du * du + dv * dv});
         }
 }
 
 static int32_t candidate_of(int32_t value) { return value >> 10; }
 static int32_t rise_of(int32_t value) { return (value & 1023) - 512; }
 
-/* Writing: outlines that nearly run along each other cross farther away when they move a little, but along themselves. */
+/* Writing: is a place near the edge of an outline, as it is without rounding? */
+static bool is_beside(const lathe_draco_walk *w, place p, const uint32_t edge[2]) {
+    const int32_t *a = w->truth->exact[edge[0]], *b = w->truth->exact[edge[1]];
+    double du = b[0] - a[0], dv = b[1] - a[1], eu = (double)p.u * UNIT - a[0], ev = (double)p.v * UNIT - a[1], length = du * du + dv * dv;
+    double t = length > 0 ? (eu * du + ev * dv) / length : 0;
+    t = t < 0 ? 0 : t > 1 ? 1 : t;
+    eu -= t * du, ev -= t * dv;
+    return eu * eu + ev * ev <= (double)LATHE_DRACO_MIDDLE * LATHE_DRACO_MIDDLE;
+}
+
+/* Writing: outlines that nearly run along each other cross farther away when they move a little, but beside both. */
 static bool is_good(const lathe_draco_walk *w, const between *b, uint32_t x, uint32_t i) {
-    return is_within(w, x, b->candidate[i], b->length[i] == CROSSING ? LATHE_DRACO_SLIDE : LATHE_DRACO_MIDDLE);
+    const candidate *c = &b->candidate[i];
+    if (is_within(w, x, c->at, LATHE_DRACO_MIDDLE)) return true;
+    return c->length == CROSSING && is_within(w, x, c->at, LATHE_DRACO_SLIDE) && is_beside(w, c->at, c->lower) && is_beside(w, c->at, c->upper);
 }
 
 /* Writing: the first value in the context that is right. */
@@ -425,7 +439,7 @@ static void between_by_numbers(lathe_draco_walk *w, const between *b, uint32_t x
     if (!choice) {
         int32_t du = lathe__walk_signed(w, p->u - expected.u), dv = lathe__walk_signed(w, p->v - expected.v);
         *p = (place){bounded(w, (int64_t)expected.u + du), bounded(w, (int64_t)expected.v + dv)};
-    } else *p = b->candidate[choice - 1];
+    } else *p = b->candidate[choice - 1].at;
     *rise = lathe__walk_signed(w, *rise);
     bool ranked = choice && abs(*rise) <= MOST_RISE;
     *value = ranked ? (int32_t)(choice - 1) * 1024 + *rise + 512 : -1;
@@ -448,7 +462,7 @@ static void place_between(lathe_draco_walk *w, uint32_t x) {
         for (int32_t rank = *symbol - LATHE_SYMBOL_RANK; rank >= 0; rank--)
             if (!lathe__rank_next(&cursor, &value)) { lathe__walk_fail(w, LATHE_ERR_FORMAT); return; }
         if ((uint32_t)candidate_of(value) >= b.candidate_count) { lathe__walk_fail(w, LATHE_ERR_FORMAT); return; }
-        p = b.candidate[candidate_of(value)];
+        p = b.candidate[candidate_of(value)].at;
         rise = rise_of(value);
     } else if (*symbol == LATHE_SYMBOL_NUMBERS) between_by_numbers(w, &b, x, &rise, &p, &value);
     else lathe__walk_fail(w, LATHE_ERR_FORMAT);

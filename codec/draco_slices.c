@@ -85,7 +85,9 @@ static int by_value(const void *a, const void *b) {
     return x < y ? -1 : x > y;
 }
 
-static bool has_height(const int32_t *list, uint32_t count, int32_t w) { return bsearch(&w, list, count, sizeof w, by_value) != NULL; }
+static bool has_height(const int32_t *list, uint32_t count, int32_t w) {
+    return count && bsearch(&w, list, count, sizeof w, by_value) != NULL;
+}
 
 /* The new slices as runs of equal steps. */
 static uint32_t list_runs(int32_t (*runs)[3], const int32_t *fresh, uint32_t count) {

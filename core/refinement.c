@@ -231,11 +231,13 @@ lathe_status lathe__refine_outline(lathe_outline *out, lathe_arena *arena, const
         status = mark_meetings(&r, &found);
         lathe__arena_reset(&round);
         if (status) goto cleanup;
-        if (!found) mark_nesting(&r, &found);
-        if (!found) break;
         uint32_t added = r.added;
-        expand(&r, turn > 20);
-        if (r.added == added) break;   /* only hostile loops could still offend */
+        if (found) expand(&r, turn > 20);
+        if (r.added > added) continue;
+        /* Pieces that are close in the whole loops stay so; whether one steps over a loop is asked all the same. */
+        mark_nesting(&r, &found);
+        if (found) expand(&r, turn > 20);
+        if (r.added == added) break;
     }
     status = write_outline(&r, out, arena);
 cleanup:

@@ -212,7 +212,8 @@ static void print_text(const bytes_report *report, const stage_clock *clock, con
                (unsigned long long)(row->fetched - row->payload), (unsigned long long)stream, delta, (unsigned long long)row->draco,
                row->info->triangles, bits, rms, most);
     }
-    printf("errors: two-sided, the worse direction, in voxels of %g mm, against the trilinear isosurface, as the bake measured them\n", report->voxel);
+    printf("errors: two-sided, the worse direction, in voxels of %g mm, against the trilinear isosurface, as the bake measured them\n",
+           report->voxel);
     printf("decode with normals: %.2f M triangles/s, without: %.2f\n", 1e-6 * (double)speed->triangles / speed->with_normals,
            1e-6 * (double)speed->triangles / speed->seconds);
     for (int i = 0; i < clock->count; i++) printf("%s%s %.3f s", i ? ", " : "bake, CPU: ", clock->stages[i].name, clock->stages[i].seconds);

@@ -12,6 +12,7 @@ The voxel mask under a mixed 3D context model. `make bench-bytes` builds the too
 """
 import argparse, functools, json, math, os, subprocess, sys, tempfile, time
 from multiprocessing import get_context
+sys.dont_write_bytecode = True
 import numpy as np
 import bytes_distance as distance
 import bench, bytes_peers as peers, bytes_plot as plot, bytes_volumes as volumes
@@ -168,11 +169,12 @@ def curves(own, rows, mask):
 
 
 def grid(head, rows):
-    """Lines of text in columns, as Markdown reads them, too"""
+    """Lines of text in columns, as Markdown reads them, too; words to the left, numbers to the right"""
+    left = (0, head.index("measured")) if "measured" in head else (0,)
     cells = [head] + [[str(c) for c in row] for row in rows]
     wide = [max(len(row[i]) for row in cells) for i in range(len(head))]
-    lines = ["| " + " | ".join(c.ljust(w) if i == 0 else c.rjust(w) for i, (c, w) in enumerate(zip(row, wide))) + " |" for row in cells]
-    lines.insert(1, "| " + " | ".join("-" * w if i == 0 else "-" * (w - 1) + ":" for i, w in enumerate(wide)) + " |")
+    lines = ["| " + " | ".join(c.ljust(w) if i in left else c.rjust(w) for i, (c, w) in enumerate(zip(row, wide))) + " |" for row in cells]
+    lines.insert(1, "| " + " | ".join("-" * w if i in left else "-" * (w - 1) + ":" for i, w in enumerate(wide)) + " |")
     return lines
 
 
@@ -200,14 +202,21 @@ def error_table(r):
             detail = f" ({best['peer'].split(' +')[0]}, {best['triangles']:,} triangles, {best['bits']} bit)" if best else ""
             rows.append(row_for(f"{what}{detail}, RMS <= {target:g}", best))
     summed = [p for p in r["curves"].get("its levels summed", []) if p[0] <= FINE]
-    rows.append(row_for(f"separate meshes in Draco down to RMS <= {FINE:g}, summed", {"bytes": summed[0][1], "rms": summed[0][0], "max": math.nan} if summed else None))
+    chain = {"bytes": summed[0][1], "rms": summed[0][0], "max": math.nan} if summed else None
+    rows.append(row_for(f"separate meshes in Draco down to RMS <= {FINE:g}, summed", chain))
     mask = r["mask"]
-    rows.append(row_for("voxel mask, fresh model for each", {"bytes": mask["apart"], **{k: mask[k] for k in ("rms", "max")}}))
-    if mask["together"] < mask["apart"]: rows.append(row_for("voxel masks, one model for all", {"bytes": mask["together"], **{k: mask[k] for k in ("rms", "max")}}))
+    rows.append(row_for("voxel mask, fresh model for each", {**mask, "bytes": mask["apart"]}))
+    if mask["together"] < mask["apart"]: rows.append(row_for("voxel masks, one model for all", {**mask, "bytes": mask["together"]}))
     return grid(["what", "bytes", "RMS", "max"], [[c.replace("nan", "-") for c in row] for row in rows])
 
 
 # ---- the figures of the issue: (what, must, measured, holds or None) ---------------------------------------------------------
+
+
+def ratio(own, other): return f"{own:,} / {other:,} B = {own / other:.2f} x"
+
+
+def listed(found, form=".2f"): return ", ".join(f"{name} {value:{form}}" for name, value in found.items())
 
 
 def against_peer(results, name, targets, limit):
@@ -217,21 +226,21 @@ def against_peer(results, name, targets, limit):
         what = f"{name} at {target:g} voxel, against the best mesh peer"
         if own is None: yield what, f"<= {limit} x", f"RMS {target:g} is not reached", False
         elif best is None: yield what, f"<= {limit} x", "no peer reaches it", None
-        else: yield what, f"<= {limit} x", f"{own['bytes']:,} / {best['bytes']:,} B = {own['bytes'] / best['bytes']:.2f} x", own["bytes"] <= limit * best["bytes"]
+        else: yield what, f"<= {limit} x", ratio(own["bytes"], best["bytes"]), own["bytes"] <= limit * best["bytes"]
 
 
 def against_mask(results, name):
     r = results.get(name)
     if not r: return
     total, mask = r["levels"][-1]["stream_bytes"], r["mask"]
-    yield f"{name}, finest level, against the 3D-context mask", "<= 1.5 x", f"{total:,} / {mask['apart']:,} B = {total / mask['apart']:.2f} x", total <= 1.5 * mask["apart"]
+    yield f"{name}, finest level, against the 3D-context mask", "<= 1.5 x", ratio(total, mask["apart"]), total <= 1.5 * mask["apart"]
     if mask["together"] < mask["apart"]:
-        yield f"{name}, the same, one model for all masks", "", f"{total:,} / {mask['together']:,} B = {total / mask['together']:.2f} x", None
+        yield f"{name}, the same, one model for all masks", "", ratio(total, mask["together"]), None
 
 
 def largest_errors(results):
     found = {n: r["reached"][key(FINE)]["max"] if r["reached"][key(FINE)] else math.inf for n, r in results.items()}
-    yield f"largest error at {FINE:g} RMS, voxels", "<= 1.5", ", ".join(f"{n} {m:.2f}" for n, m in found.items()), max(found.values()) <= 1.5
+    yield f"largest error at {FINE:g} RMS, voxels", "<= 1.5", listed(found), max(found.values()) <= 1.5
 
 
 def falling_bits(results):
@@ -249,13 +258,17 @@ def star_bytes(results, name, limit):
     own = results[name]["reached"][key(FINE)]
     what = f"{name} at {FINE:g} voxel of its dense polar mesh, packets alone"
     if own is None: yield what, f"<= {limit} B", f"RMS {FINE:g} is not reached", False
-    else: yield what, f"<= {limit} B", f"{own['payload']:,} B (fetched with headers: {own['bytes']:,} B; RMS {own['rms']:.3f})", own["payload"] <= limit
+    else:
+        measured = f"{own['payload']:,} B (fetched with headers: {own['bytes']:,} B; RMS {own['rms']:.3f})"
+        yield what, f"<= {limit} B", measured, own["payload"] <= limit
 
 
 def decode_rows(results):
     for kind, least in (("smooth", 50), ("folded", 6)):
-        speeds = {n: 1e-6 * r["decode"]["triangles"] / r["decode"]["seconds_with_normals"] for n, r in results.items() if (r["kind"] == "folded") == (kind == "folded")}
-        if speeds: yield f"decode with normals, native, {kind}, M triangles/s", f">= {least}", ", ".join(f"{n} {s:.1f}" for n, s in speeds.items()), min(speeds.values()) >= least
+        decodings = {n: r["decode"] for n, r in results.items() if (r["kind"] == "folded") == (kind == "folded")}
+        speeds = {n: 1e-6 * d["triangles"] / d["seconds_with_normals"] for n, d in decodings.items()}
+        what = f"decode with normals, native, {kind}, M triangles/s"
+        if speeds: yield what, f">= {least}", listed(speeds, ".1f"), min(speeds.values()) >= least
     ratios = {n: r["wasm_ratio"] for n, r in results.items()}
     texts = [f"{n} {'fails' if x is None else f'{x:.2f}'}" for n, x in ratios.items()]
     yield "decode without normals, wasm / native", "<= 1.4 x", ", ".join(texts), all(x is not None and x <= 1.4 for x in ratios.values())
@@ -263,14 +276,11 @@ def decode_rows(results):
 
 def encode_share(results):
     """Planning tries codings, so it counts as encoding, though it also extracts the region"""
-    found, texts = [], []
-    for name, r in results.items():
-        stages = r["bake_cpu_seconds"]
-        encode = stages.get("planning", 0) + stages.get("encoding", 0)
-        other = sum(stages.values()) - encode
-        found.append(encode / other)
-        texts.append(f"{name} {100 * encode / other:.0f} % ({encode:.2f} / {other:.2f} s; encoding alone {stages.get('encoding', 0):.2f} s)")
-    yield "planning and encoding / other stages of the bake (errors on)", "<= 50 %", ", ".join(texts), max(found) <= 0.5
+    for what, stages, must in (("planning and encoding", ("planning", "encoding"), 0.5), ("encoding alone", ("encoding",), None)):
+        spent = {n: sum(r["bake_cpu_seconds"].get(stage, 0) for stage in stages) for n, r in results.items()}
+        shares = {n: s / (sum(results[n]["bake_cpu_seconds"].values()) - s) for n, s in spent.items()}
+        texts = [f"{n} {100 * share:.0f} % ({spent[n]:.2f} s)" for n, share in shares.items()]
+        yield f"{what} / the bake's other stages, errors on", "<= 50 %" if must else "", ", ".join(texts), max(shares.values()) <= must if must else None
 
 
 def draco_rows(results):
@@ -278,7 +288,7 @@ def draco_rows(results):
     for name, r in results.items():
         deltas = [l["draco_delta"] for l in r["levels"]]
         if None not in deltas: ratios[name] = sum(deltas) / r["levels"][-1]["draco"]
-    if ratios: yield "Draco deltas / level N in one Draco", "<= 1.4 x", ", ".join(f"{n} {x:.2f}" for n, x in ratios.items()), max(ratios.values()) <= 1.4
+    if ratios: yield "Draco deltas / level N in one Draco", "<= 1.4 x", listed(ratios), max(ratios.values()) <= 1.4
     else: yield "Draco deltas / level N in one Draco", "<= 1.4 x", "no archive has Draco deltas", False
 
 
@@ -306,7 +316,7 @@ def figures(results, wasm):
 def verdict(holds): return "" if holds is None else "met" if holds else "MISSED"
 
 
-def figure_table(rows): return grid(["what", "must", "measured", ""], [[w, must, got, verdict(h)] for w, must, got, h in rows])
+def figure_table(rows): return grid(["what", "must", "", "measured"], [[w, must, verdict(h), got] for w, must, got, h in rows])
 
 
 # ---- out ------------------------------------------------------------------------------------------------------------------
@@ -315,16 +325,17 @@ def figure_table(rows): return grid(["what", "must", "measured", ""], [[w, must,
 def title(name, r): return f"{name}: bytes over error ({r['kind']}, {r['reference_triangles']:,} triangles in the reference)"
 
 
-def introduction(effort):
+def introduction(effort, reused):
+    note = " The peers are of an earlier run, by --peers." if reused else ""
     return [f"Measured by `make bench-bytes` on {bench.machine()}.", "",
             f"Two-sided errors in voxels, the worse direction, by VTK: {effort.samples:,} points on each surface for Lathe and the mask, "
-            f"{effort.peer_samples:,} for each of the peers. Lathe's bytes are all that has been fetched, headers and checksums included; a client may stop after "
-            "any packet. A peer's bytes are the smallest single file at no greater error. All labels of the atlas are one surface in both "
-            "directions, for Lathe and for the peers."]
+            f"{effort.peer_samples:,} for each of the peers. Lathe's bytes are all that has been fetched, headers and checksums included; a "
+            "client may stop after any packet. A peer's bytes are the smallest single file at no greater error. All labels of the atlas are one surface in both "
+            "directions, for Lathe and for the peers." + note]
 
 
-def markdown(results, rows, effort, pictures):
-    lines = ["# Bytes over error", "", *introduction(effort), "", "## The figures", "", *figure_table(rows)]
+def markdown(results, rows, head, pictures):
+    lines = ["# Bytes over error", "", *head, "", "## The figures", "", *figure_table(rows)]
     for name, r in results.items():
         lines += ["", f"## {name}", "", *([volumes.ABOUT[name], ""] if name in volumes.ABOUT else [])]
         if pictures: lines += [f"![bytes over error](img/bytes_{name}.svg)", ""]
@@ -335,7 +346,7 @@ def markdown(results, rows, effort, pictures):
 def chosen(arguments, effort):
     """(name, function that opens the Volume, which may write into a folder)"""
     if arguments.volume:
-        name = os.path.basename(arguments.volume).split(".")[0]
+        name = "given_" + os.path.basename(arguments.volume).split(".")[0]   # no figures are asked of it by its name
         options = ["--iso", str(arguments.iso)] if arguments.iso is not None else ["--labels", "all"]
         yield name, lambda _: volumes.Volume(name, arguments.volume, options, arguments.iso, "folded")
         return
@@ -368,7 +379,7 @@ def main():
     arguments = parse_arguments()
     effort, results, started = Effort(arguments.quick), {}, time.time()
     bench.RUNS = 1
-    print("\n".join(introduction(effort)), flush=True)
+    print("\n".join(introduction(effort, arguments.peers)), flush=True)
     if arguments.plots: os.makedirs(arguments.plots, exist_ok=True)
     known = {name: r for path in arguments.peers for name, r in json.load(open(path))["volumes"].items()}
     with tempfile.TemporaryDirectory() as folder:
@@ -382,10 +393,10 @@ def main():
     missed = sum(holds is False for *_, holds in rows)
     print("\n".join(["", *figure_table(rows), "", f"{missed} of the figures missed" if missed else "all figures reached",
                      f"{time.time() - started:.0f} s"]))
-    if arguments.markdown: write_text(arguments.markdown, markdown(results, rows, effort, bool(arguments.plots)))
+    if arguments.markdown: write_text(arguments.markdown, markdown(results, rows, introduction(effort, arguments.peers), bool(arguments.plots)))
     if arguments.json:
-        listed = [dict(zip(("what", "must", "measured", "holds"), row)) for row in rows]
-        write_text(arguments.json, json.dumps({"machine": bench.machine(), "figures": listed, "volumes": results}, indent=1))
+        found = [dict(zip(("what", "must", "measured", "holds"), row)) for row in rows]
+        write_text(arguments.json, json.dumps({"machine": bench.machine(), "figures": found, "volumes": results}, indent=1))
     return 1 if missed and arguments.strict else 0
 
 

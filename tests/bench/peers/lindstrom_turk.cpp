@@ -65,7 +65,8 @@ int main(int argc, char **argv) {
         mesh.collect_garbage();
         std::string path = argv[2] + std::to_string(i) + ".mesh";
         if (!write_mesh(from_half_edges(mesh), path.c_str())) return fprintf(stderr, "%s: cannot be written\n", path.c_str()), 1;
-        printf("{\"fraction\": %g, \"triangles\": %zu, \"path\": \"%s\"}\n", fraction, static_cast<std::size_t>(mesh.number_of_faces()), path.c_str());
+        std::size_t triangles = mesh.number_of_faces();
+        printf("{\"fraction\": %g, \"triangles\": %zu, \"path\": \"%s\"}\n", fraction, triangles, path.c_str());
         fflush(stdout);
     }
     return 0;
