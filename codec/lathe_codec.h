@@ -123,7 +123,7 @@ typedef struct lathe_bake_options {
     const lathe_bake_structure *structures; size_t structure_count;   /* labels to bake; none: the threshold */
     const char *name;              /* of the model */
     bool keep_topology;            /* every level gets the topology of the last, at the price of more bytes at first */
-    bool exact;                    /* slices for every structure, never a radius map (within 0.24 voxel, for fewer bytes) */
+    bool exact;                    /* slices for every structure, never a radius map (within 0.215 voxel, for fewer bytes) */
     bool independent;              /* each structure can be decoded alone, for about an eighth more bytes */
     bool flat_caps;                /* caps rise half a voxel instead of following the grey values */
     bool measure;                  /* errors in mm (mesh against isosurface) */

@@ -6,7 +6,7 @@
 #include "structure_encode.h"
 
 /* In voxels: at most this far off by RMS and anywhere. */
-static const double MOST_RMS = 0.24, MOST_MAX = 1.0;
+static const double MOST_RMS = 0.215, MOST_MAX = 1.0;
 /* Of the bytes that slices cost. A map is not exact, so it must earn its place. */
 static const double MOST_BYTES = 0.75;
 
@@ -75,45 +75,56 @@ static bool sound(const lathe_mesh *mesh) {
            !r.duplicate_positions && !r.self_intersections && r.components == 1 && r.euler == 2;
 }
 
-/* Bytes of all levels, or 0 if a level's surface is flawed or the last one's error too large. */
-static lathe_status try_step(size_t *bytes, const trial *t, const lathe_radius_map *truth) {
+/* Codes all levels with a step; the surface of the last one, its error and, if asked for, the soundness of every level's. */
+static lathe_status try_step(size_t *bytes, bool *good, const trial *t, const lathe_radius_map *truth, bool check) {
     lathe_radius_map map;
-    bool good = true;
-    size_t total = 0;
     lathe_status status = LATHE_OK;
-    for (uint32_t level = 0; !status && good && level < truth->level_count; level++) {
+    *good = true;
+    *bytes = 0;
+    for (uint32_t level = 0; !status && *good && level < truth->level_count; level++) {
         lathe_range_encoder e;
+        bool last = level + 1 == truth->level_count;
         lathe__encoder_start(&e);
         lathe_number_coder coder = {put_number, &e, truth};
         if (!level) status = lathe__radius_head(&map, t->state, t->arena, &coder);
         if (!status) status = lathe__radius_walk(&map, level, &coder);
         lathe__encoder_finish(&e);
-        total += e.size;
+        *bytes += e.size;
         if (e.failed) status = LATHE_ERR_MEMORY;
         lathe__encoder_free(&e);
         lathe_mesh mesh = {0};
-        if (!status) status = lathe__radius_mesh(&mesh, &map, level);
-        good = !status && sound(&mesh);
-        if (good && level + 1 == truth->level_count) {
+        if (!status && (check || last)) status = lathe__radius_mesh(&mesh, &map, level);
+        if (!status && check) *good = sound(&mesh);
+        if (!status && last && !check) {
             lathe_metrics m;
             status = lathe__reference_measure(&m, t->reference, &mesh, 4000);
-            good = !status && m.rms_mm <= MOST_RMS * t->voxel && m.max_mm <= MOST_MAX * t->voxel;
+            *good = !status && m.rms_mm <= MOST_RMS * t->voxel && m.max_mm <= MOST_MAX * t->voxel;
         }
         lathe_mesh_free(&mesh);
     }
     lathe__arena_reset(t->arena);
-    *bytes = good ? total : 0;
-    return status == LATHE_ERR_FORMAT ? LATHE_OK : status;
+    if (status == LATHE_ERR_FORMAT) *good = false, status = LATHE_OK;   /* a radius out of range */
+    return status;
 }
 
+/* The coarsest step that is within the error, by halving; *bytes is 0 if the finest is not, or a surface is flawed. Most structures
+ * that are no stars fail with the finest, which is tried first. */
 static lathe_status try_steps(size_t *bytes, const trial *t, lathe_radius_map *truth) {
-    static const double STEPS[] = {4, 3.2, 2.5, 2, 1.6, 1.2, 0.9, 0.7, 0.5, 0.35};
+    static const double STEPS[] = {0.35, 0.5, 0.7, 0.9, 1.2, 1.6, 2, 2.5, 3.2, 4};
+    int good = -1, bad = sizeof STEPS / sizeof *STEPS, k = 0;
     lathe_status status = LATHE_OK;
-    *bytes = 0;
-    for (size_t k = 0; !status && !*bytes && k < sizeof STEPS / sizeof *STEPS; k++) {
+    bool fits = true;
+    for (; !status && good + 1 < bad; k = (good + bad) / 2) {
         truth->step = (int32_t)(STEPS[k] * LATHE_RADIUS_ONE);
-        status = try_step(bytes, t, truth);
+        status = try_step(bytes, &fits, t, truth, false);
+        *(fits ? &good : &bad) = k;
+        if (!fits && !k) break;
     }
+    *bytes = 0;
+    if (status || good < 0) return status;
+    truth->step = (int32_t)(STEPS[good] * LATHE_RADIUS_ONE);
+    status = try_step(bytes, &fits, t, truth, true);
+    if (!fits) *bytes = 0;
     return status;
 }
 
@@ -149,12 +160,11 @@ lathe_status lathe__choose_radii(lathe_baked_structure *out, lathe_structure_sta
     lathe_topology topology;
     lathe_radius_map maps[2];
     size_t bytes[2] = {0, 0}, slices;
-    if (state->flags & (LATHE_FLAG_EXACT | LATHE_FLAG_KEEP)) return LATHE_OK;
+    /* The staircase of a label is not smooth: maps of labels cost more than slices. */
+    if (state->flags & (LATHE_FLAG_EXACT | LATHE_FLAG_KEEP) || boundary == LATHE_BOUNDARY_EDGE) return LATHE_OK;
     lathe_status status = lathe__mask_topology(&topology, &state->mask, NULL);
     if (status || topology.components != 1 || topology.cavities || topology.euler != 1) return status;
-    lathe_encode_source ours = *source;
-    if (boundary == LATHE_BOUNDARY_EDGE) ours.value = NULL;
-    status = fit(&maps[0], state, &arena[0], &ours, 0);
+    status = fit(&maps[0], state, &arena[0], source, 0);
     lathe__arena_reset(&arena[0]);
     if (status) return status == LATHE_ERR_EMPTY || status == LATHE_ERR_LIMIT ? LATHE_OK : status;
     int32_t turn = estimate_turn(&maps[0]);
@@ -163,7 +173,7 @@ lathe_status lathe__choose_radii(lathe_baked_structure *out, lathe_structure_sta
     const double *mm = volume->spacing;
     trial t = {.state = state, .arena = &arena[1], .reference = reference, .voxel = fmin(mm[0], fmin(mm[1], mm[2]))};
     if (!status) status = try_steps(&bytes[0], &t, &maps[0]);
-    if (!status && turn) status = fit(&maps[1], state, &arena[0], &ours, turn);
+    if (!status && turn) status = fit(&maps[1], state, &arena[0], source, turn);
     lathe__arena_reset(&arena[0]);
     if (!status && turn) status = try_steps(&bytes[1], &t, &maps[1]);
     lathe__reference_free(&reference);

@@ -41,7 +41,7 @@ lathe_status lathe__fit_stars(lathe_structure_state *state, lathe_arena *scratch
  * The state then builds the mesh of each level n (lathe__encoded_mesh). */
 lathe_status lathe__structure_encode_level(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2],
                                            lathe_models *models, uint32_t level, const lathe_encode_source *source);
-/* radius_choose.c: makes the state a radius map (state->radii, out->truth) if that is within 0.24 voxel RMS and 1 voxel anywhere, for
+/* radius_choose.c: makes the state a radius map (state->radii, out->truth) if that is within 0.215 voxel RMS and 1 voxel anywhere, for
  * three quarters of the bytes of slices. After the plan. */
 lathe_status lathe__choose_radii(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2], const lathe_volume *volume,
                                  lathe_axis axis, lathe_boundary boundary, const lathe_encode_source *source);

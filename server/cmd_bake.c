@@ -265,7 +265,7 @@ const lathe_command lathe__command_bake = {
     "  --no-errors        do not measure the levels' errors (faster)\n"
     "  --no-draco         do not measure the levels' size in Draco (faster)\n"
     "  --exact            every slice as it is; else a star-shaped structure may become a radius map, if that is within\n"
-    "                     0.24 voxel RMS and 1 voxel anywhere for 3/4 of the bytes\n"
+    "                     0.215 voxel RMS and 1 voxel anywhere for 3/4 of the bytes\n"
     "  --independent      each structure can be decoded alone (range requests), for about an eighth more bytes\n"
     "  --quiet            no progress bar, no summary\n"
     "  --json             print what `lathe info --json` prints\n",

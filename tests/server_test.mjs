@@ -429,7 +429,7 @@ test('the root is the page without a model; health is told', async () => {
 // ---- HTTP
 
 const paths = () => ['/', '/healthz', '/models', `/models/${model.id}`, `/m/${model.id}`, `/models/${model.id}.lathe`,
-    `/models/${model.id}/stream`, `/models/${model.id}/stream?from=0&to=0`, `/models/${model.id}/deltas/0.lathe`,
+    `/models/${model.id}/stream`, `/models/${model.id}/stream?from=0&to=0`, `/models/${model.id}/deltas/0.lathe`, `/models/${model.id}/deltas/0.drc`,
     ...['drc', 'glb', 'stl', 'ply'].map((suffix) => `/models/${model.id}/levels/0.${suffix}`)];
 
 test('HEAD is GET without the body', async () => {

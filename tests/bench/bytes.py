@@ -157,11 +157,12 @@ def measure(volume, arguments, effort, folder, known):
 
 
 def curves(own, rows, mask):
+    exact = ", no error (drawn at 0.001)" if mask["rms"] < 1e-3 else ""
     every = {"Lathe's stream": own, "best decimation + Draco": peers.envelope(rows, "Draco"),
              "its levels summed": peers.levels_summed(rows), "quadric decimation + Draco": peers.envelope(rows, "quadric + Draco"),
              "best decimation + meshoptimizer + zstd": peers.envelope(rows, "meshopt"),
-             "voxel mask, 3D contexts (fresh model each)": [(mask["rms"], mask["apart"])]}
-    if mask["together"] < mask["apart"]: every["voxel masks, one model for all"] = [(mask["rms"], mask["together"])]
+             f"voxel mask, 3D contexts, fresh model each{exact}": [(mask["rms"], mask["apart"])]}
+    if mask["together"] < mask["apart"]: every[f"voxel masks, one model for all{exact}"] = [(mask["rms"], mask["together"])]
     return {name: points for name, points in every.items() if points}
 
 

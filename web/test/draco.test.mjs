@@ -31,7 +31,8 @@ after(async () => {
     await finished;
 });
 
-const get = (path, options) => fetch(server.url + path, options);
+/** Long computing lets the server close an idle connection unseen: once more then. */
+const get = (path, options) => fetch(server.url + path, options).catch(() => fetch(server.url + path, options));
 const bytesOf = async (path) => (await get(path)).arrayBuffer();
 const manifestOf = async (id) => (await get(`/models/${id}`)).json();
 
