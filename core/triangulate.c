@@ -189,7 +189,8 @@ static uint32_t least_bad(const ring *r, uint32_t place, uint32_t left) {
     return choice;
 }
 
-/* queue: room for three times as many as there are places. */
+/* queue: room for three times as many as there are places. Returns the number of triangles; 0 if a hole could not be joined: only
+ * outlines that cross themselves have such. */
 static uint32_t clip_ears(ring *r, uint32_t *queue, uint32_t (*triangles)[3]) {
     uint32_t count = 0, left = r->places, head = 0, tail = 0, alive = 0;
     /* Every second place, then those between: that spreads the ears and avoids fans of slivers. */
@@ -204,12 +205,14 @@ static uint32_t clip_ears(ring *r, uint32_t *queue, uint32_t (*triangles)[3]) {
             place = least_bad(r, alive, left);
         }
         uint32_t p = r->prev[place], n = r->next[place];
+        if (p == n) return 0;
         cut(r, place, triangles, count++);
         queue[tail++] = p;
         queue[tail++] = alive = n;
         left--;
     }
     uint32_t last = r->next[alive];
+    if (r->next[last] != r->prev[alive] || r->next[last] == alive) return 0;
     cut(r, r->prev[last], triangles, count);
     use_edge(r, last, count * 3 + 2);
     return count + 1;
@@ -292,6 +295,7 @@ lathe_status lathe__triangulate(uint32_t (**triangles)[3], uint32_t **neighbour,
     sort_holes(&r, hole + 1, holes);
     for (uint32_t i = 1; i <= holes; i++) bridge_hole(&r, hole[i]);
     *count = clip_ears(&r, queue, *triangles);
+    if (!*count) return LATHE_ERR_FORMAT;
     flip(**triangles, *neighbour, polygon->at, *count);
     return LATHE_OK;
 }
