@@ -82,7 +82,7 @@ $(LIBRARY): $(LIBRARY_OBJECTS)
 $(SERVER_LIBRARY): $(SERVER_OBJECTS)
 	$(Q)rm -f $@ && $(AR) rcs $@ $^
 
-$(B)/lathe: $(B)/server/main.o $(B)/server/viewer_page.o $(B)/server/draco_page.o $(SERVER_LIBRARY) $(LIBRARY)
+$(B)/lathe: $(B)/server/main.o $(B)/server/viewer_page.o $(B)/server/draco_page.o $(B)/server/extras_script.o $(SERVER_LIBRARY) $(LIBRARY)
 	@echo "  link  $@"
 	$(Q)$(CXX) $(LINK_MODE) $(LDFLAGS) -o $@ $^ $(LIBS)
 
@@ -103,6 +103,10 @@ $(B)/%.o: %.cpp
 $(B)/server/viewer_page.o: server/viewer_page.S $(VIEWER)
 	@mkdir -p $(@D)
 	$(Q)$(CC) -DPAGE='"$(VIEWER)"' -c -o $@ $<
+# Written with the page.
+$(B)/server/extras_script.o: server/extras_script.S $(VIEWER)
+	@mkdir -p $(@D)
+	$(Q)$(CC) -DPAGE='"$(dir $(VIEWER))extras.js"' -c -o $@ $<
 $(B)/server/draco_page.o: server/draco_page.S $(DRACO_PAGE)
 	@mkdir -p $(@D)
 	$(Q)$(CC) -DPAGE='"$(DRACO_PAGE)"' -c -o $@ $<

@@ -80,3 +80,15 @@ enum MHD_Result lathe__handle_page(lathe_request *request) {
     lathe__entry_release(p.entry);
     return result;
 }
+
+static lathe_status build_extras(lathe_body *body, void *context, lathe_error *err) {
+    (void)context, (void)err;
+    body->bytes = lathe_extras_js;
+    body->size = lathe_extras_js_size;
+    return LATHE_OK;
+}
+
+enum MHD_Result lathe__handle_extras(lathe_request *request) {
+    lathe_recipe recipe = {.key = "extras", .type = "text/javascript; charset=utf-8", .traits = LATHE_COMPRESSIBLE, .build = build_extras};
+    return lathe__respond(request, &recipe);
+}

@@ -9,7 +9,7 @@
 static const char METHODS[] = "GET, HEAD, OPTIONS";
 /* The page is one file: its scripts and styles are inline, its decoder is wasm run in a worker made from a blob. */
 static const char PAGE_POLICY[] =
-    "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' blob:; worker-src blob:; style-src "
+    "default-src 'none'; script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval' blob:; worker-src blob:; style-src "
     "'unsafe-inline'; "
     "img-src 'self' data: blob:; connect-src 'self' data: blob:; base-uri 'none'; form-action 'none'";
 

@@ -17,6 +17,7 @@ static const route ROUTES[] = {
     {{"models", "*", "deltas", "*.lathe"}, lathe__handle_delta},
     {{"models", "*", "deltas", "*.drc"}, lathe__handle_draco_delta},
     {{"draco", "*"}, lathe__handle_draco_page},
+    {{"extras.js"}, lathe__handle_extras},
     {{"models", "*", "stream"}, lathe__handle_stream},
     {{"models", "*", "slices", "*.png"}, lathe__handle_slice_picture},
     {{"models", "*", "slices", "*", "outline"}, lathe__handle_slice_outline},

@@ -180,6 +180,7 @@ enum MHD_Result lathe__handle_delta(lathe_request *request);
 enum MHD_Result lathe__handle_stream(lathe_request *request);
 enum MHD_Result lathe__handle_draco_delta(lathe_request *request);
 enum MHD_Result lathe__handle_draco_page(lathe_request *request);
+enum MHD_Result lathe__handle_extras(lathe_request *request);
 enum MHD_Result lathe__handle_slice_picture(lathe_request *request);
 enum MHD_Result lathe__handle_slice_outline(lathe_request *request);
 enum MHD_Result lathe__handle_slice_contour(lathe_request *request);
@@ -195,6 +196,8 @@ lathe_status lathe__json_write(lathe_buffer *out, json_t *json);
 
 extern const unsigned char lathe_viewer_html[];
 extern const size_t lathe_viewer_html_size;
+extern const unsigned char lathe_extras_js[];
+extern const size_t lathe_extras_js_size;
 extern const unsigned char lathe_draco_html[];
 extern const size_t lathe_draco_html_size;
 #endif

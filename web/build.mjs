@@ -45,6 +45,7 @@ const bundle = await build({
     charset: 'utf8',
     legalComments: 'none',
     plugins: [shaders],
+    external: ['/extras.js'],
 });
 const script = bundle.outputFiles[0].text.trim();
 if (/<\/script|<!--/i.test(script)) throw Error('the script would end its own element');
@@ -53,6 +54,12 @@ const style = (await transform(await readFile(here('src/style.css'), 'utf8'), { 
 const parts = { STYLE: style, SCRIPT: script, WASM: textOfBytes(await readFile(wasmPath)) };
 const template = (await readFile(here('src/page.html'), 'utf8')).replace(/>\s+</g, '><').replace(/\s+/g, ' ').trim();
 const page = template.replace(/\/\*([A-Z]+)\*\//g, (_, part) => parts[part]);
+
+// What is loaded only when somebody asks for more: a module beside the page.
+await build({
+    entryPoints: [here('src/extras.ts')], bundle: true, minify: true, format: 'esm', target: 'es2022', charset: 'utf8', legalComments: 'none',
+    outfile: pagePath.replace(/[^/]*$/, 'extras.js'),
+});
 
 await mkdir(dirname(pagePath), { recursive: true });
 await writeFile(pagePath, page);

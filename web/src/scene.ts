@@ -88,7 +88,8 @@ export class Scene {
         this.#uploads.delete(mesh);
     }
 
-    draw(camera: Camera, parts: Part[]) {
+    /** cut: a plane (normal, distance); what lies beyond is left out. */
+    draw(camera: Camera, parts: Part[], cut = [0, 0, 0, 0]) {
         const gl = this.#gl, program = this.#program, { width, height } = gl.canvas;
         if (gl.isContextLost()) return;
         const uniform = (name: string) => gl.getUniformLocation(program, name);
@@ -98,6 +99,7 @@ export class Scene {
         gl.useProgram(program);
         gl.uniformMatrix4fv(uniform('camera'), false, camera.matrix());
         gl.uniformMatrix3fv(uniform('view'), false, camera.view());
+        gl.uniform4fv(uniform('cut'), cut);
         for (const { mesh, color } of parts) {
             gl.bindVertexArray((this.#uploads.get(mesh) ?? this.#upload(mesh)).array);
             gl.uniform3fv(uniform('colour'), linear(color));

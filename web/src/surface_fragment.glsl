@@ -4,8 +4,11 @@ uniform vec3 colour;      // linear
 in vec3 normal;
 in float up;
 in float open;
+in vec3 place;
+uniform vec4 cut;         // what lies beyond this plane is not drawn
 out vec4 pixel;
 void main() {
+    if (dot(place, cut.xyz) > cut.w) discard;
     vec3 n = normalize(gl_FrontFacing ? normal : -normal);
     float cavity = mix(.12, 1., open);
     float key = max(dot(n, vec3(-.38, .56, .73)), 0.);

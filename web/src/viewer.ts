@@ -8,11 +8,13 @@ import type { Reply, Request } from './messages';
 import { formatBytes, formatCount, type Manifest } from './model';
 import { Scene, type Part } from './scene';
 import { listStructures } from './structures';
+import type { Extras } from './extras';
 
 export function runViewer(model: Manifest, script: string) {
     const canvas = byId<HTMLCanvasElement>('view'), slider = byId<HTMLInputElement>('level');
     const page = document.documentElement.dataset, last = model.levels.length - 1;
-    let bytes = 0, frame = 0, saving = 0;
+    const structure = new URLSearchParams(location.search).get('structure');
+    let bytes = 0, frame = 0, saving = 0, extras: Extras | undefined;
 
     const redraw = () => (frame ||= requestAnimationFrame(draw));
     const camera = new Camera(model.bounds, canvas.clientWidth / canvas.clientHeight);
@@ -23,10 +25,11 @@ export function runViewer(model: Manifest, script: string) {
     function draw() {
         frame = 0;
         const parts: Part[] = model.structures.flatMap(({ color }, i) => {
-            const mesh = !hidden.has(i) && levels.shown(i);
+            const mesh = !hidden.has(i) && (extras?.mesh(i) ?? levels.shown(i));
             return mesh ? [{ mesh, color }] : [];
         });
-        scene.draw(camera, parts);
+        scene.draw(camera, parts, extras?.cut());
+        extras?.paint(canvas);
         const triangles = parts.reduce((sum, { mesh }) => sum + mesh.triangles, 0);
         const level = Math.min(last, levels.complete, levels.wanted);
         if (level < 0) return;
@@ -94,6 +97,11 @@ export function runViewer(model: Manifest, script: string) {
     slider.oninput = () => (want(+slider.value), save());
     byId('share').onclick = ({ target }) =>
         navigator.clipboard?.writeText(location.href).then(() => ((target as HTMLElement).textContent = 'Link copied'));
+    byId('more').onclick = async ({ target }) => {
+        (target as HTMLButtonElement).disabled = true;
+        const { open } = await import('/extras.js' as string);
+        extras = open({ model, camera, redraw, level: () => +(page.level ?? 0), structure });
+    };
     attachControls(canvas, camera, save);
     onhashchange = restore;
     restore();
@@ -105,7 +113,6 @@ export function runViewer(model: Manifest, script: string) {
     }).observe(canvas);
 
     const base = bytesOfBase64(byId('base').textContent!);
-    const structure = new URLSearchParams(location.search).get('structure');
     const url = `${location.origin}/models/${encodeURIComponent(model.id)}/stream?from=1`
         + (structure ? '&structure=' + encodeURIComponent(structure) : '');
     ask({ start: { wasm: bytesOfText(byId('wasm').textContent!, WASM_KEY), base, url: last ? url : '' } });

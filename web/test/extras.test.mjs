@@ -1,0 +1,64 @@
+// What the viewer loads when asked for more: the smooth surface, a slice with its outline, edge types. A real Chromium, the real program.
+import assert from 'node:assert/strict';
+import { execFile } from 'node:child_process';
+import { join } from 'node:path';
+import { test } from 'node:test';
+import { fileURLToPath } from 'node:url';
+import { promisify } from 'node:util';
+import { launch, program, screenshots, serve, withFolder, writeLabels } from './browser.mjs';
+
+process.chdir(fileURLToPath(new URL('..', import.meta.url)));
+const run = promisify(execFile);
+
+test('smooth surface, slice with its outline, edge types in colour', () => withFolder(async (folder) => {
+    const file = process.env.LATHE_MODEL ?? join(folder, 'shapes.lathe');
+    if (!process.env.LATHE_MODEL) await run(program, ['bake', await writeLabels(folder), '--labels', 'all', '-o', file]);
+    const server = await serve(file), browser = await launch();
+    try {
+        const [{ id }] = (await (await fetch(server.url + '/models')).json()).models;
+        const page = await browser.newPage({ viewport: { width: 900, height: 640 } }), faults = [], requests = [];
+        page.on('pageerror', (error) => faults.push(String(error)));
+        page.on('console', (message) => message.type() === 'error' && !/404/.test(message.text()) && faults.push(message.text()));
+        page.on('request', (request) => requests.push(new URL(request.url()).pathname));
+        await page.goto(server.url + '/m/' + id);
+        await page.waitForFunction(() => document.documentElement.dataset.state === 'done');
+        assert.ok(!requests.includes('/extras.js'), 'loaded before it is asked for');
+        const triangles = () => page.evaluate(() => +document.documentElement.dataset.triangles);
+        const flat = await triangles();
+        await page.getByRole('button', { name: 'More' }).click();
+        await page.getByLabel('Smooth surface').check();
+        await page.waitForFunction((flat) => +document.documentElement.dataset.triangles === 4 * flat, flat);
+        await page.screenshot({ path: join(await screenshots(), 'smooth.png') });
+        await page.getByLabel('Smooth surface').uncheck();
+        await page.waitForFunction((flat) => +document.documentElement.dataset.triangles === flat, flat);
+
+        await page.locator('#slice').check();
+        await page.waitForFunction(() => document.getElementById('extras').dataset.slice);
+        const k = await page.evaluate(() => document.getElementById('extras').dataset.slice);
+        await page.waitForFunction(() => document.getElementById('slice-picture').naturalWidth > 8);
+        assert.ok(requests.some((path) => path.endsWith(`/slices/${k}/outline`)) && requests.some((path) => path.endsWith(`/slices/${k}.png`)));
+        const painted = () => page.evaluate(() => {
+            const c = document.getElementById('lines'), d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+            let n = 0;
+            for (let i = 3; i < d.length; i += 4) n += d[i] > 0;
+            return n;
+        });
+        assert.ok(await painted() > 200, 'the outline is drawn');
+        await page.screenshot({ path: join(await screenshots(), 'slice.png') });
+
+        await page.locator('#rays').selectOption('32');
+        await page.waitForFunction(() => document.getElementById('extras').dataset.rays === '32');
+        const said = await page.evaluate(() => Object.fromEntries([...document.querySelectorAll('[data-edges]')].map((e) => [e.dataset.edges, +e.textContent.match(/\d+/)[0]])));
+        const { loops } = await (await fetch(`${server.url}/models/${id}/slices/${k}/contour?rays=32`)).json();
+        for (const type of 'fbud') assert.equal(said[type], loops.flatMap((l) => l.edges).filter((e) => e[0] === type).length, type);
+        assert.ok(said.f >= 32);
+        await page.screenshot({ path: join(await screenshots(), 'edges.png') });
+        await page.locator('#slice').uncheck();
+        await page.waitForFunction(() => !document.getElementById('extras').dataset.slice);
+        assert.equal(await painted(), 0);
+        assert.deepEqual(faults, []);
+    } finally {
+        await browser.close();
+        await server.stop();
+    }
+}));
