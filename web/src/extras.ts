@@ -44,8 +44,8 @@ function readGlb(bytes: ArrayBuffer): Mesh[] {
         const { attributes, indices } = mesh.primitives[0];
         const at = array(attributes.POSITION, 3), normal = array(attributes.NORMAL, 3), corners = array(indices, 1);
         const vertices = at.length / 3, buffer = new ArrayBuffer(vertices * 20 + corners.length * 4);
-        // The node turns y up; meshes are in metres along the scan's axes.
-        new Float32Array(buffer, 0, at.length).set(at.map((x) => x * 1000));
+        // Only the node turns y up and scales to metres: the meshes themselves are in mm along the scan's axes.
+        new Float32Array(buffer, 0, at.length).set(at);
         const shading = new Int16Array(buffer, vertices * 12, vertices * 4);
         for (let i = 0; i < vertices; i++)
             for (let k = 0; k < 4; k++) shading[4 * i + k] = 32767 * (k < 3 ? normal[3 * i + k] : 1);
@@ -56,7 +56,7 @@ function readGlb(bytes: ArrayBuffer): Mesh[] {
 
 export function open({ model, camera, redraw, level, structure }: Hooks): Extras {
     const base = `/models/${encodeURIComponent(model.id)}/`, only = structure ? '&structure=' + encodeURIComponent(structure) : '';
-    let smooth: Mesh[] = [], smoothLevel = -1, slice: Slice | undefined, turn = 0;
+    let smooth: Mesh[] = [], smoothLevel = -1, slice: Slice | undefined, turn = 0, smoothTurn = 0;
     const fail = (error: unknown) => showMessage(String((error as Error).message ?? error), 'Close', () => 0);
     async function get(path: string) {
         const reply = await fetch(base + path);
@@ -77,9 +77,11 @@ export function open({ model, camera, redraw, level, structure }: Hooks): Extras
     document.body.append(panel);
 
     async function showSmooth() {
-        smooth = [];
+        const mine = ++smoothTurn;
         smoothLevel = smoothBox.checked ? level() : -1;
-        if (smoothLevel >= 0) smooth = readGlb(await (await get(`levels/${smoothLevel}.glb?smooth=2${only}`)).arrayBuffer());
+        const meshes = smoothLevel < 0 ? [] : readGlb(await (await get(`levels/${smoothLevel}.glb?smooth=2${only}`)).arrayBuffer());
+        if (mine !== smoothTurn) return;   // meanwhile something else is wanted
+        smooth = meshes;
         panel.dataset.smooth = '' + smooth.reduce((sum, mesh) => sum + mesh.triangles, 0);
         redraw();
     }

@@ -24,11 +24,27 @@ test('smooth surface, slice with its outline, edge types in colour', () => withF
         await page.waitForFunction(() => document.documentElement.dataset.state === 'done');
         assert.ok(!requests.includes('/extras.js'), 'loaded before it is asked for');
         const triangles = () => page.evaluate(() => +document.documentElement.dataset.triangles);
-        const flat = await triangles();
+        /** Pixels of the picture that are not the nearly grey background. */
+        const covered = async () => {
+            await page.evaluate(() => new Promise((f) => requestAnimationFrame(() => requestAnimationFrame(f))));
+            const shot = await page.screenshot({ clip: { x: 4, y: 48, width: 600, height: 480 } });
+            return page.evaluate(async (base64) => {
+                const image = await createImageBitmap(await (await fetch('data:image/png;base64,' + base64)).blob());
+                const canvas = new OffscreenCanvas(image.width, image.height), context = canvas.getContext('2d');
+                context.drawImage(image, 0, 0);
+                const p = context.getImageData(0, 0, image.width, image.height).data;
+                let n = 0;
+                for (let i = 0; i < p.length; i += 4) n += Math.max(p[i], p[i + 1], p[i + 2]) - Math.min(p[i], p[i + 1], p[i + 2]) > 24;
+                return n;
+            }, shot.toString('base64'));
+        };
+        const before = await covered(), flat = await triangles();   // after the last level has been drawn
         await page.getByRole('button', { name: 'More' }).click();
         await page.getByLabel('Smooth surface').check();
         await page.waitForFunction((flat) => +document.documentElement.dataset.triangles === 4 * flat, flat);
         await page.screenshot({ path: join(await screenshots(), 'smooth.png') });
+        const smooth = await covered();
+        assert.ok(before > 2000 && Math.abs(smooth - before) < before / 10, `${smooth} pixels smooth, ${before} flat`);
         await page.getByLabel('Smooth surface').uncheck();
         await page.waitForFunction((flat) => +document.documentElement.dataset.triangles === flat, flat);
 
