@@ -105,12 +105,13 @@ typedef struct lathe_world_mesh {
     float *positions;              /* 3 * vertex_count, mm */
     uint32_t *indices;             /* 3 * triangle_count */
     struct lathe_world_part { uint32_t structure, first_vertex, vertex_count, first_triangle, triangle_count; } *parts;
+    float *normals;                /* 3 * vertex_count, or NULL: whoever needs them takes those of the triangles */
 } lathe_world_mesh;
 lathe_status lathe_model_mesh(lathe_world_mesh *out, const lathe_model *model, int64_t structure, uint32_t level,
                               lathe_error *err);
 void lathe_world_mesh_free(lathe_world_mesh *mesh);
-/* Replaces each part by the smooth surface through its vertices [P 4], every edge in k pieces (1 to 16), every triangle in k * k.
- * Untouched on failure: RANGE, LIMIT, MEMORY. */
+/* Replaces each part by the smooth surface through its vertices [P 4], every edge in k pieces (1 to 16), every triangle in k * k,
+ * with the patches' normals. Untouched on failure: RANGE, LIMIT, MEMORY. */
 lathe_status lathe_world_mesh_smooth(lathe_world_mesh *mesh, uint32_t k);
 
 /* ---- bake ---------------------------------------------------------------------------------------------------------- */
@@ -148,7 +149,7 @@ typedef struct lathe_write_options {
 } lathe_write_options;
 lathe_status lathe_write_stl(const lathe_world_mesh *mesh, const lathe_write_options *options, lathe_sink sink, void *context);
 lathe_status lathe_write_ply(const lathe_world_mesh *mesh, const lathe_write_options *options, lathe_sink sink, void *context);
-/* Binary glTF: one mesh and material for each part, positions, smooth normals, 32-bit indices, metres as glTF wants. */
+/* Binary glTF: one mesh and material for each part, positions, normals (the mesh's own, else smooth ones), 32-bit indices, metres as glTF wants. */
 lathe_status lathe_write_glb(const lathe_world_mesh *mesh, const lathe_write_options *options, lathe_sink sink, void *context);
 /* Draco edgebreaker, positions at quantization_bits (11 when 0); compression level 10. */
 lathe_status lathe_write_drc(const lathe_world_mesh *mesh, int quantization_bits, lathe_sink sink, void *context);

@@ -5,13 +5,14 @@
 #include "smooth.h"
 
 typedef struct part_arrays {
-    double *positions, *smooth;
+    double *positions, *smooth, *normals;
     uint32_t *triangles;
 } part_arrays;
 
 static void free_arrays(part_arrays *a) {
     free(a->positions);
     free(a->smooth);
+    free(a->normals);
     free(a->triangles);
 }
 
@@ -33,6 +34,9 @@ static lathe_status grow(lathe_world_mesh *out, uint32_t vertices, uint32_t tria
     float *positions = realloc(out->positions, 3 * v * sizeof *positions);
     if (!positions) return LATHE_ERR_MEMORY;
     out->positions = positions;
+    float *normals = realloc(out->normals, 3 * v * sizeof *normals);
+    if (!normals) return LATHE_ERR_MEMORY;
+    out->normals = normals;
     uint32_t *indices = realloc(out->indices, 3 * t * sizeof *indices);
     if (!indices) return LATHE_ERR_MEMORY;
     out->indices = indices;
@@ -48,12 +52,16 @@ static lathe_status append(lathe_world_mesh *out, const lathe_world_mesh *mesh, 
     if (!status) status = lathe__smooth_open(&smooth, &source);
     if (!status) status = lathe__smooth_size(smooth, k, &vertices, &triangles);
     if (!status) status = grow(out, vertices, triangles);
-    if (!status && !(a.smooth = malloc(3 * (size_t)vertices * sizeof *a.smooth))) status = LATHE_ERR_MEMORY;
+    if (!status) {
+        a.smooth = malloc(3 * (size_t)vertices * sizeof *a.smooth);
+        a.normals = malloc(3 * (size_t)vertices * sizeof *a.normals);
+        if (!a.smooth || !a.normals) status = LATHE_ERR_MEMORY;
+    }
     if (!status) {
         uint32_t *indices = out->indices + 3 * (size_t)out->triangle_count;
-        float *positions = out->positions + 3 * (size_t)out->vertex_count;
-        status = lathe__smooth_evaluate(smooth, k, a.smooth, NULL, indices);
-        for (size_t i = 0; i < 3 * (size_t)vertices; i++) positions[i] = (float)a.smooth[i];
+        float *positions = out->positions + 3 * (size_t)out->vertex_count, *normals = out->normals + 3 * (size_t)out->vertex_count;
+        status = lathe__smooth_evaluate(smooth, k, a.smooth, a.normals, indices);
+        for (size_t i = 0; i < 3 * (size_t)vertices; i++) positions[i] = (float)a.smooth[i], normals[i] = (float)a.normals[i];
         for (size_t i = 0; i < 3 * (size_t)triangles; i++) indices[i] += out->vertex_count;
         out->parts[out->structure_count++] =
             (struct lathe_world_part){part->structure, out->vertex_count, vertices, out->triangle_count, triangles};

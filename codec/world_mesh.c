@@ -7,6 +7,7 @@ void lathe_world_mesh_free(lathe_world_mesh *mesh) {
     free(mesh->positions);
     free(mesh->indices);
     free(mesh->parts);
+    free(mesh->normals);
     memset(mesh, 0, sizeof *mesh);
 }
 

@@ -211,17 +211,21 @@ static void write_normal(lathe_out *out, const double *n) {
     for (int i = 0; i < 3; i++) lathe__out_f32(out, usable ? (float)(n[i] / length) : (float)(i == 2));
 }
 
+static void write_normals(const glb *g, const struct lathe_world_part *part, const double *sums, lathe_out *out) {
+    for (size_t v = part->first_vertex; v < (size_t)part->first_vertex + part->vertex_count && !out->failed; v++) {
+        const float *own = g->mesh->normals + (sums ? 0 : 3 * v);
+        write_normal(out, sums ? sums + 3 * v : (double[]){(double)own[0], (double)own[1], (double)own[2]});
+    }
+}
+
 /* ---- file ---- */
 
-static void write_binary(const glb *g, const double *normals, lathe_out *out) {
+static void write_binary(const glb *g, const double *sums, lathe_out *out) {
     for (uint32_t p = 0; p < g->part_count; p++) {
         const float *at = g->mesh->positions + (size_t)3 * g->parts[p]->first_vertex;
         for (size_t i = 0; i < (size_t)3 * g->parts[p]->vertex_count && !out->failed; i++) lathe__out_f32(out, at[i]);
     }
-    for (uint32_t p = 0; p < g->part_count; p++) {
-        const double *at = normals + (size_t)3 * g->parts[p]->first_vertex;
-        for (size_t v = 0; v < g->parts[p]->vertex_count && !out->failed; v++) write_normal(out, at + 3 * v);
-    }
+    for (uint32_t p = 0; p < g->part_count; p++) write_normals(g, g->parts[p], sums, out);
     for (uint32_t p = 0; p < g->part_count; p++) {
         const uint32_t *at = g->mesh->indices + (size_t)3 * g->parts[p]->first_triangle;
         for (size_t i = 0; i < (size_t)3 * g->parts[p]->triangle_count && !out->failed; i++)
@@ -232,8 +236,8 @@ static void write_binary(const glb *g, const double *normals, lathe_out *out) {
 static lathe_status write_file(const glb *g, uint64_t binary_bytes, lathe_sink sink, void *context) {
     uint64_t total = GLB_HEADER + 2 * CHUNK_HEADER + (uint64_t)g->json.size + binary_bytes;
     if (total > UINT32_MAX) return LATHE_ERR_LIMIT;
-    double *normals = normal_sums(g->mesh);
-    if (!normals) return LATHE_ERR_MEMORY;
+    double *sums = g->mesh->normals ? NULL : normal_sums(g->mesh);
+    if (!sums && !g->mesh->normals) return LATHE_ERR_MEMORY;
     lathe_out out;
     lathe__out_start(&out, sink, context);
     lathe__out_u32(&out, GLB_MAGIC);
@@ -244,8 +248,8 @@ static lathe_status write_file(const glb *g, uint64_t binary_bytes, lathe_sink s
     lathe__out_bytes(&out, g->json.data, g->json.size);
     lathe__out_u32(&out, (uint32_t)binary_bytes);
     lathe__out_u32(&out, CHUNK_BIN);
-    write_binary(g, normals, &out);
-    free(normals);
+    write_binary(g, sums, &out);
+    free(sums);
     return lathe__out_finish(&out);
 }
 

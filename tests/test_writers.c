@@ -48,7 +48,7 @@ static const uint32_t face[8][3] = {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4},
 static float positions[36];
 static uint32_t indices[48];
 static struct lathe_world_part parts[2] = {{0, 0, 6, 0, 8}, {1, 6, 6, 8, 8}};
-static lathe_world_mesh mesh = {12, 16, 2, positions, indices, parts};
+static lathe_world_mesh mesh = {12, 16, 2, positions, indices, parts, NULL};
 static const lathe_structure_info structures[2] = {
     {.name = "Precentral \"L\" \\ \xC3\xA9", .rgb = {255, 0, 128}, .label = 2001},
     {.name = "right", .rgb = {0, 255, 10}, .label = 2002}};
@@ -209,7 +209,7 @@ static void test_bad_meshes(void) {
 static void test_flat_mesh(void) {
     float line[9] = {0, 0, 0, 1, 1, 1, 2, 2, 2};
     uint32_t triangle[3] = {0, 1, 2};
-    lathe_world_mesh flat = {3, 1, 0, line, triangle, NULL};
+    lathe_world_mesh flat = {3, 1, 0, line, triangle, NULL, NULL};
     memory m = {0};
     CHECK_EQ(lathe_write_stl(&flat, NULL, take, &m), LATHE_OK);
     for (int i = 0; i < 3; i++) CHECK(f32(m.data + 84 + 4 * i) == 0);
@@ -218,6 +218,19 @@ static void test_flat_mesh(void) {
     const uint8_t *bin = m.data + m.size - 12 - 72;
     for (int v = 0; v < 3; v++) CHECK(f32(bin + 36 + 12 * v + 8) == 1);
     CHECK(m.size > stl);
+    free(m.data);
+}
+
+/* A mesh's own normals are written, as units. */
+static void test_own_normals(void) {
+    float line[9] = {0, 0, 0, 1, 1, 1, 2, 2, 2}, normals[9] = {0, 3, 0, 1, 0, 0, 0, NAN, 0};
+    uint32_t triangle[3] = {0, 1, 2};
+    lathe_world_mesh own = {3, 1, 0, line, triangle, NULL, normals};
+    memory m = {0};
+    CHECK_EQ(lathe_write_glb(&own, NULL, take, &m), LATHE_OK);
+    const uint8_t *bin = m.data + m.size - 12 - 72 + 36;
+    const float expected[9] = {0, 1, 0, 1, 0, 0, 0, 0, 1};
+    for (int i = 0; i < 9; i++) CHECK(f32(bin + 4 * i) == expected[i]);
     free(m.data);
 }
 
@@ -359,6 +372,7 @@ int main(int argc, char **argv) {
     test_drc();
     test_bad_meshes();
     test_flat_mesh();
+    test_own_normals();
     if (CHECK(mkdtemp(folder) != NULL)) {
         test_atomic_success();
         test_atomic_failure();
