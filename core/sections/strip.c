@@ -1,12 +1,9 @@
 /* [L]: with U and L fixed beside the start S, the strip's upper line turns about U and its lower one about L. U_min is the vector
  * from U to the point that limits the upper line, L_max that from L to the point that limits the lower one; a point x goes on with
- * the run while L_max x U_x <= 0 and U_min x L_x >= 0 (a x b: cross product); then L_max becomes L_x if L_max x L_x < 0, U_min
- * becomes U_x if U_min x U_x > 0 (equations 15 to 18, the signs of 17 and 18 put right). The products are kept up with the step dP
- * from point to point (26 to 29), two multiplications a line.
- * A line that changes needs its products anew, two multiplications more. So its change waits [L II.3]: while the step turns the
- * waiting line further (the previous point's U_x x dP > 0, L_x x dP < 0; the paper's 31 does not imply its 32) the line just goes
- * on to the next point, which needs no product at all: U_x x L_x > 0 for each point that changes a line, as these lie in front of U
- * and L, and the step only adds to it. */
+ * the run while L_max x U_x <= 0 and U_min x L_x >= 0 (a x b: cross product). The products are kept up incrementally with the step
+ * dP from point to point (equations 26 to 29, the signs of 28 and 29 put right: L_max changes if L_max x L_x < 0, U_min if
+ * U_min x U_x > 0). A change is free when only one of the two changes, as the new product is the one just known; when both do,
+ * it takes one product more, which the deferral saves unless they change together. */
 #include "strip.h"
 #include <math.h>
 
@@ -19,21 +16,15 @@ static double cross(vec a, vec b, lathe_strip_cost *cost) {
     return a.x * b.y - a.y * b.x;
 }
 
-/* One of the two lines. What is said of the upper one holds for the lower one with the sign of all products changed. */
-typedef struct line {
-    vec pivot;                 /* U, L */
-    vec limit;                 /* U_min, L_max; not up to date while the line is waiting */
-    double across, own;        /* sign * limit x (vector from the other line's pivot, from its own, to the point in hand) */
-    double sign;
-    bool waiting;              /* limit is the vector to the point in hand */
-} line;
-
 typedef struct strip {
     const double *points;
     uint32_t count;
     double tolerance, squared;
     lathe_strip_cost cost;
-    line upper, lower;
+    vec upper, lower;          /* U, L */
+    vec upper_min, lower_max;
+    /* L_max x U_x, U_min x L_x, L_max x L_x, U_min x U_x of the point in hand. */
+    double low_up, up_low, low_low, up_up;
 } strip;
 
 /* The first point farther than the tolerance from the start; count if there is none. */
@@ -49,40 +40,40 @@ static uint32_t find_first(strip *s, uint32_t start, double *squared) {
 
 /* The reference strip: U and L beside the start, across the direction to point i (equations 1 to 7, e_x and e_y put right). */
 static void lay(strip *s, uint32_t start, uint32_t i, double squared) {
-    vec from = at(s->points, start), to = at(s->points, i), d = minus(to, from);
+    vec from = at(s->points, start), d = minus(at(s->points, i), from);
     double f = s->tolerance / sqrt(squared), ex = d.y * f, ey = d.x * f;
     s->cost.square_roots++;
     s->cost.multiplications += 3;
-    s->upper = (line){.pivot = {from.x - ex, from.y + ey}, .sign = 1};
-    s->lower = (line){.pivot = {from.x + ex, from.y - ey}, .sign = -1};
-    s->upper.limit = minus(to, s->upper.pivot);
-    s->lower.limit = minus(to, s->lower.pivot);
-    s->upper.across = s->lower.across = cross(s->upper.limit, s->lower.limit, &s->cost);
-}
-
-/* Takes a line on from `before` by a step; false if the strip cannot turn so far. */
-static bool advance(line *l, const line *other, vec before, vec step, lathe_strip_cost *cost) {
-    if (!l->waiting) {
-        double change = l->sign * cross(l->limit, step, cost);
-        l->across += change;
-        l->own += change;
-        l->waiting = l->own > 0;
-        return l->across >= 0;
-    }
-    vec last = minus(before, l->pivot);
-    double change = l->sign * cross(last, step, cost);
-    if (change > 0) return true;
-    l->waiting = false;
-    l->limit = last;
-    l->own = change;
-    l->across = l->sign * cross(last, minus(before, other->pivot), cost) + change;
-    return l->across >= 0;
+    s->upper = (vec){from.x - ex, from.y + ey};
+    s->lower = (vec){from.x + ex, from.y - ey};
+    s->upper_min = minus(at(s->points, i), s->upper);
+    s->lower_max = minus(at(s->points, i), s->lower);
+    s->low_up = cross(s->lower_max, s->upper_min, &s->cost);
+    s->up_low = -s->low_up;
+    s->low_low = s->up_up = 0;
 }
 
 /* Does point i go on with the run? */
 static bool goes_on(strip *s, uint32_t i) {
-    vec before = at(s->points, i - 1), step = minus(at(s->points, i), before);
-    return advance(&s->lower, &s->upper, before, step, &s->cost) && advance(&s->upper, &s->lower, before, step, &s->cost);
+    vec step = minus(at(s->points, i), at(s->points, i - 1));
+    double low = cross(s->lower_max, step, &s->cost);
+    s->low_up += low;
+    s->low_low += low;
+    if (s->low_up > 0) return false;
+    double up = cross(s->upper_min, step, &s->cost);
+    s->up_low += up;
+    s->up_up += up;
+    return s->up_low >= 0;
+}
+
+static void turn(strip *s, uint32_t i) {
+    bool low = s->low_low < 0, up = s->up_up > 0;
+    vec here = at(s->points, i);
+    if (low) s->lower_max = minus(here, s->lower), s->low_low = 0;
+    if (up) s->upper_min = minus(here, s->upper), s->up_up = 0;
+    if (low && up) s->low_up = cross(s->lower_max, s->upper_min, &s->cost), s->up_low = -s->low_up;
+    else if (low) s->low_up = -s->up_low;   /* L_x x U_min */
+    else if (up) s->up_low = -s->low_up;    /* U_x x L_max */
 }
 
 void lathe__strip_lyu(uint32_t *breaks, uint32_t *break_count, const double *points, uint32_t count, double tolerance,
@@ -95,7 +86,7 @@ void lathe__strip_lyu(uint32_t *breaks, uint32_t *break_count, const double *poi
         uint32_t i = find_first(&s, start, &squared);
         if (i == count) break;
         lay(&s, start, i, squared);
-        for (i++; i < count && goes_on(&s, i);) i++;
+        for (i++; i < count && goes_on(&s, i); i++) turn(&s, i);
         if (i == count) break;
         breaks[n++] = start = i - 1;
     }
