@@ -133,3 +133,25 @@ int lathe__count_bytes(void *context, const void *bytes, size_t size) {
     *(uint64_t *)context += size;
     return 0;
 }
+
+/* ---- packets ---- */
+
+lathe_status lathe__packets_add(lathe_packet_list *list, lathe_bytes *bytes) {
+    uint32_t capacity = list->count < list->capacity ? list->capacity : list->capacity * 2 + 8;
+    lathe_packet *more = capacity == list->capacity ? list->at : realloc(list->at, capacity * sizeof *more);
+    if (!more) {
+        lathe__bytes_free(bytes);
+        return LATHE_ERR_MEMORY;
+    }
+    list->at = more;
+    list->capacity = capacity;
+    list->at[list->count++] = (lathe_packet){bytes->data, bytes->size};
+    *bytes = (lathe_bytes){0};
+    return LATHE_OK;
+}
+
+void lathe__packets_free(lathe_packet_list *list) {
+    for (uint32_t i = 0; i < list->count; i++) free((void *)(uintptr_t)list->at[i].bytes);
+    free(list->at);
+    *list = (lathe_packet_list){0};
+}

@@ -78,8 +78,8 @@ typedef struct lathe_header_structure {
 enum { LATHE_NUMBER_ZERO, LATHE_NUMBER_WHOLE, LATHE_NUMBER_FLOAT, LATHE_NUMBER_DOUBLE };
 
 /* Bits of parameter 1; parameter 0 is the fraction of border edges. SHARED: structures are coded one after the other by one model,
- * and none can be decoded alone. EXACT: every structure has slices, none is a radius map. */
-enum { LATHE_FLAG_CAPS = 1, LATHE_FLAG_KEEP = 2, LATHE_FLAG_SHARED = 4, LATHE_FLAG_EXACT = 8 };
+ * and none can be decoded alone. EXACT: every structure has slices, none is a radius map. PYRAMID: levels are lattices (pyramid.h). */
+enum { LATHE_FLAG_CAPS = 1, LATHE_FLAG_KEEP = 2, LATHE_FLAG_SHARED = 4, LATHE_FLAG_EXACT = 8, LATHE_FLAG_PYRAMID = 16 };
 
 typedef struct lathe_header {
     lathe_axis axis;
@@ -96,16 +96,18 @@ typedef struct lathe_header {
  * exact as soon as the size is there). Allocates at most 24 times the record's size, and that only when the record is
  * complete and its checksum right. */
 lathe_status lathe__header_parse(lathe_header *out, lathe_reader *reader);
+uint32_t lathe__header_flags(const lathe_header *header);   /* parameter 1 */
 void lathe__header_free(lathe_header *header); /* clears; a zeroed one is fine */
-/* How many structures have a packet in the record of a level. */
+/* How many structures have the level, and how many packets its record has: one for each; of a pyramid one for each pass and
+ * structure, pass by pass, or with SHARED one for each pass. */
 uint32_t lathe__header_present(const lathe_header *header, uint32_t level);
+uint32_t lathe__header_packets(const lathe_header *header, uint32_t level);
 /* FORMAT or LIMIT and *fault if a field is outside what the format allows. Used by the parser and by the writer. */
 lathe_status lathe__header_check(const lathe_header *header, const char **fault);
 
 /* ---- level record ---- */
 
-/* Structures with level_count > level have one packet each, in the header's order: the payload, then its CRC-32C (4
- * bytes). */
+/* Each packet is its payload, then the payload's CRC-32C (4 bytes). */
 typedef struct lathe_level_head {
     uint32_t level;
     float error_rms_mm, error_max_mm; /* finite; negative: not measured */

@@ -2,6 +2,7 @@
  * believed or allocated before its checksum is right or its counts are checked against the bytes that are there. */
 #include "archive_format.h"
 #include "crc32c.h"
+#include "pyramid.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -132,7 +133,10 @@ lathe_status lathe__header_check(const lathe_header *header, const char **fault)
     lathe_status status = LATHE_OK;
     for (uint32_t i = 0; i < header->structure_count && !status; i++)
         status = structure_check(&header->structures[i], fault);
-    return status;
+    lathe_pyramid pyramid;
+    if (status || !(lathe__header_flags(header) & LATHE_FLAG_PYRAMID)) return status;
+    *fault = LATHE_FAULT("the passes of a level");
+    return lathe__pyramid_read(&pyramid, header);
 }
 
 static void parse_structure(lathe_header_structure *s, lathe_reader *body, const lathe_header_structure *previous) {
@@ -260,6 +264,15 @@ uint32_t lathe__header_present(const lathe_header *header, uint32_t level) {
     return count;
 }
 
+uint32_t lathe__header_flags(const lathe_header *header) { return header->parameter_count > 1 ? header->parameters[1] : 0; }
+
+uint32_t lathe__header_packets(const lathe_header *header, uint32_t level) {
+    uint32_t flags = lathe__header_flags(header), present = lathe__header_present(header, level);
+    lathe_pyramid pyramid;
+    if (!(flags & LATHE_FLAG_PYRAMID) || lathe__pyramid_read(&pyramid, header)) return present;
+    return (flags & LATHE_FLAG_SHARED ? 1 : present) * lathe__pyramid_passes(&pyramid, level);
+}
+
 /* ---- level record ---- */
 
 static bool error_usable(float v) { return v >= -1e30f && v <= 1e30f; }
@@ -297,7 +310,7 @@ lathe_status lathe__level_parse(lathe_level_head *out, lathe_reader *reader, con
     head.count = lathe__read_varint(reader);
     if (!reader->status && (!error_usable(head.error_rms_mm) || !error_usable(head.error_max_mm)))
         lathe__reader_fail(reader, LATHE_ERR_FORMAT, LATHE_FAULT("the error of a level"));
-    if (!reader->status && head.count != lathe__header_present(header, head.level))
+    if (!reader->status && head.count != lathe__header_packets(header, head.level))
         lathe__reader_fail(reader, LATHE_ERR_FORMAT, LATHE_FAULT("the number of packets of a level"));
     if (!reader->status) parse_sizes(&head, reader);
     read_checksum(reader, start, LATHE_FAULT("the checksum of a level record does not match"));

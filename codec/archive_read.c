@@ -1,6 +1,7 @@
 /* Reading archives: lathe_model. Opening checks the structure of the whole file (header, every level record's head,
  * footer, trailer; all sizes must meet); packets' checksums are checked by lathe_model_check and by decoders. Memory:
  * at most 24 times the header's and 5 times the footer's size, whatever the bytes say. */
+#include "pyramid.h"
 #include "restream.h"
 #include "archive_write.h"
 #include "crc32c.h"
@@ -184,95 +185,91 @@ static lathe_status read_footer(lathe_model *model, lathe_error *err) {
 
 /* ---- the stream of one structure ---- */
 
-/* The structure's packet in a level, its checksum included. */
-static const uint8_t *find_packet(const lathe_model *model, uint32_t structure, uint32_t level, uint32_t *size) {
-    const level_record *record = &model->records[level];
-    size_t offset = record->packets;
-    uint32_t packet = 0;
-    for (uint32_t i = 0; i < structure; i++)
-        if (model->header.structures[i].level_count > level)
-            offset += (size_t)record->head.sizes[packet++] + LATHE_CRC_SIZE;
-    *size = record->head.sizes[packet];
-    return model->bytes + offset;
+/* Which packets of a level are a structure's: first, first + step, ... below the record's count. */
+typedef struct packet_range { uint32_t first, step; } packet_range;
+
+static packet_range packets_of(const lathe_model *model, uint32_t structure, uint32_t level) {
+    packet_range range = {0, lathe__header_present(&model->header, level)};
+    for (uint32_t i = 0; i < structure; i++) range.first += model->header.structures[i].level_count > level;
+    return range;
 }
 
-static void emit_structure_head(lathe_bytes *out, const lathe_model *model, uint32_t structure, uint32_t level,
-                                uint32_t size) {
+static void emit_structure_head(lathe_bytes *out, const lathe_model *model, uint32_t structure, uint32_t level, uint32_t *sizes,
+                                uint32_t count) {
     const lathe_level_info *info = &model->structures[structure].levels[level];
     lathe_level_head head = {.level = level,
                              .error_rms_mm = info->error_rms_mm,
                              .error_max_mm = info->error_max_mm,
-                             .count = 1,
-                             .sizes = &size};
+                             .count = count,
+                             .sizes = sizes};
     lathe__emit_level_head(out, &head);
 }
 
-/* Header (level 0) and head of one level of one structure; what follows it is a slice of the archive. */
-static const uint8_t *structure_level(lathe_bytes *front, const lathe_model *model, uint32_t structure, uint32_t level,
-                                      size_t *packet_bytes) {
-    uint32_t size;
-    const uint8_t *packet = find_packet(model, structure, level, &size);
-    if (level == 0) lathe__emit_header(front, &model->header, structure, 1);
-    emit_structure_head(front, model, structure, level, size);
-    *packet_bytes = (size_t)size + LATHE_CRC_SIZE;
-    return packet;
+/* Header (level 0), head and packets of one level of one structure. */
+static void emit_own_level(lathe_bytes *out, const lathe_model *model, uint32_t structure, uint32_t level) {
+    const level_record *record = &model->records[level];
+    packet_range own = packets_of(model, structure, level);
+    uint32_t sizes[LATHE_PYRAMID_MOST_PASSES], count = 0;
+    for (uint32_t i = own.first; i < record->head.count; i += own.step) sizes[count++] = record->head.sizes[i];
+    if (level == 0) lathe__emit_header(out, &model->header, structure, 1);
+    emit_structure_head(out, model, structure, level, sizes, count);
+    const uint8_t *packet = model->bytes + record->packets;
+    for (uint32_t i = 0; i < record->head.count; i++) {
+        size_t size = (size_t)record->head.sizes[i] + LATHE_CRC_SIZE;
+        if (i % own.step == own.first) lathe__emit(out, packet, size);
+        packet += size;
+    }
 }
 
-/* The same of a structure that was coded again to stand alone, whole. */
-static void emit_alone(lathe_bytes *out, const lathe_model *model, uint32_t structure, uint32_t level, const lathe_bytes *packet) {
+/* The same of a structure that was coded again to stand alone. */
+static void emit_alone(lathe_bytes *out, const lathe_model *model, uint32_t structure, uint32_t level, const lathe_packet_list *packets) {
     lathe_header header = model->header;
+    uint32_t sizes[LATHE_PYRAMID_MOST_PASSES];
     header.parameters[1] &= ~(uint32_t)LATHE_FLAG_SHARED;
-    if (!header.parameters[1]) header.parameter_count = 1;
+    if (header.parameter_count == 2 && !header.parameters[1]) header.parameter_count = 1;
+    for (uint32_t i = 0; i < packets->count; i++) sizes[i] = (uint32_t)packets->at[i].size;
     if (level == 0) lathe__emit_header(out, &header, structure, 1);
-    emit_structure_head(out, model, structure, level, (uint32_t)packet->size);
-    size_t start = out->size;
-    lathe__emit(out, packet->data, packet->size);
-    lathe__emit_checksum(out, start);
+    emit_structure_head(out, model, structure, level, sizes, packets->count);
+    for (uint32_t i = 0; i < packets->count; i++) {
+        size_t start = out->size;
+        lathe__emit(out, packets->at[i].bytes, packets->at[i].size);
+        lathe__emit_checksum(out, start);
+    }
 }
 
-static lathe_status stream_alone(const lathe_model *model, uint32_t structure, uint32_t from, uint32_t to, lathe_sink sink, void *context) {
-    lathe_bytes packets[LATHE_MAX_LEVELS] = {{0}};
+static lathe_status stream_structure(const lathe_model *model, uint32_t structure, uint32_t from, uint32_t to, lathe_sink sink, void *context) {
+    lathe_packet_list packets[LATHE_MAX_LEVELS] = {{0}};
     uint32_t count = model->header.structures[structure].level_count;
-    lathe_status status = lathe__restream(packets, model, structure, count);
+    lathe_status status = model->info.independent ? LATHE_OK : lathe__restream(packets, model, structure, count);
     for (uint32_t level = from; !status && level <= to && level < count; level++) {
         lathe_bytes part = {0};
-        emit_alone(&part, model, structure, level, &packets[level]);
+        if (model->info.independent) emit_own_level(&part, model, structure, level);
+        else emit_alone(&part, model, structure, level, &packets[level]);
         status = part.failed ? LATHE_ERR_MEMORY : sink(context, part.data, part.size) ? LATHE_ERR_IO : LATHE_OK;
         lathe__bytes_free(&part);
     }
-    for (int i = 0; i < LATHE_MAX_LEVELS; i++) lathe__bytes_free(&packets[i]);
+    for (int i = 0; i < LATHE_MAX_LEVELS; i++) lathe__packets_free(&packets[i]);
     return status;
-}
-
-static lathe_status stream_structure(const lathe_model *model, uint32_t structure, uint32_t from, uint32_t to,
-                                     lathe_sink sink, void *context) {
-    for (uint32_t level = from; level <= to && level < model->header.structures[structure].level_count; level++) {
-        lathe_bytes front = {0};
-        size_t packet_bytes;
-        const uint8_t *packet = structure_level(&front, model, structure, level, &packet_bytes);
-        lathe_status status = front.failed ? LATHE_ERR_MEMORY : LATHE_OK;
-        if (!status && (sink(context, front.data, front.size) || sink(context, packet, packet_bytes)))
-            status = LATHE_ERR_IO;
-        lathe__bytes_free(&front);
-        if (status) return status;
-    }
-    return LATHE_OK;
 }
 
 /* ---- what describe tells ---- */
 
-/* Summed over the structures of a level these are the bytes of its part of the stream: packets count where they belong, what all
- * share (header, head of the level record) is divided evenly. */
+/* Summed over the structures of a level these are the bytes of its part of the stream: packets of one structure count where they
+ * belong, what structures share (header, head of the level record, packets of all) is divided evenly. */
 static void fill_polar_bytes(lathe_model *model) {
     for (uint32_t level = 0; level < model->header.level_count; level++) {
         const lathe_level_head *head = &model->records[level].head;
+        uint32_t present = lathe__header_present(&model->header, level), rank = 0;
+        bool own = model->info.independent || !model->info.pyramid;
         uint64_t common = model->totals[level].polar_bytes;
-        for (uint32_t packet = 0; packet < head->count; packet++) common -= (uint64_t)head->sizes[packet] + LATHE_CRC_SIZE;
-        for (uint32_t i = 0, packet = 0; i < model->header.structure_count; i++) {
+        for (uint32_t packet = 0; own && packet < head->count; packet++) common -= (uint64_t)head->sizes[packet] + LATHE_CRC_SIZE;
+        for (uint32_t i = 0; i < model->header.structure_count; i++) {
             if (model->header.structures[i].level_count <= level) continue;
             lathe_level_info *info = model->levels + (model->structures[i].levels - model->levels) + level;
-            info->polar_bytes = (uint64_t)head->sizes[packet] + LATHE_CRC_SIZE + common / head->count + (packet < common % head->count);
-            packet++;
+            info->polar_bytes = common / present + (rank < common % present);
+            for (uint32_t packet = rank; own && packet < head->count; packet += present)
+                info->polar_bytes += (uint64_t)head->sizes[packet] + LATHE_CRC_SIZE;
+            rank++;
         }
     }
 }
@@ -309,6 +306,7 @@ static void fill_info(lathe_model *model) {
     model->info.caps = flags & LATHE_FLAG_CAPS;
     model->info.exact = flags & LATHE_FLAG_EXACT;
     model->info.independent = !(flags & LATHE_FLAG_SHARED);
+    model->info.pyramid = flags & LATHE_FLAG_PYRAMID;
     model->info.levels = model->totals;
     sum_components(model);
     fill_polar_bytes(model);
@@ -431,7 +429,6 @@ void lathe_model_stream_range(const lathe_model *model, uint32_t from, uint32_t 
 lathe_status lathe_model_stream(const lathe_model *model, int64_t structure, uint32_t from, uint32_t to,
                                 lathe_sink sink, void *context) {
     if (structure >= model->header.structure_count) return LATHE_ERR_RANGE;
-    if (structure >= 0 && !model->info.independent) return stream_alone(model, (uint32_t)structure, from, to, sink, context);
     if (structure >= 0) return stream_structure(model, (uint32_t)structure, from, to, sink, context);
     size_t offset, size;
     lathe_model_stream_range(model, from, to, &offset, &size);
@@ -443,17 +440,23 @@ uint64_t lathe_model_stream_size(const lathe_model *model, int64_t structure, ui
     return lathe_model_stream(model, structure, from, to, lathe__count_bytes, &sum) ? 0 : sum;
 }
 
+/* Whose packet it is, for people. */
+static const char *owner_of(const lathe_model *model, uint32_t level, uint32_t packet) {
+    if (model->info.pyramid && !model->info.independent) return "all";
+    uint32_t rank = packet % lathe__header_present(&model->header, level);
+    for (uint32_t i = 0; i < model->header.structure_count; i++)
+        if (model->header.structures[i].level_count > level && !rank--) return model->header.structures[i].name;
+    return "";
+}
+
 static lathe_status check_level(const lathe_model *model, uint32_t level, lathe_error *err) {
     const level_record *record = &model->records[level];
     lathe_reader reader = lathe__reader(model->bytes + record->packets, record->end - record->packets);
-    uint32_t packet = 0;
-    for (uint32_t i = 0; i < model->header.structure_count; i++) {
-        if (model->header.structures[i].level_count <= level) continue;
+    for (uint32_t packet = 0; packet < record->head.count; packet++) {
         size_t at = (size_t)(reader.at - model->bytes);
-        if (!lathe__packet_parse(&reader, record->head.sizes[packet++]))
-            return lathe_fail(err, LATHE_ERR_CHECKSUM,
-                              "damaged archive: level %u of structure '%s': %s (packet at byte %zu)", level,
-                              model->header.structures[i].name, reader.fault, at);
+        if (!lathe__packet_parse(&reader, record->head.sizes[packet]))
+            return lathe_fail(err, LATHE_ERR_CHECKSUM, "damaged archive: level %u of structure '%s': %s (packet at byte %zu)", level,
+                              owner_of(model, level, packet), reader.fault, at);
     }
     return LATHE_OK;
 }

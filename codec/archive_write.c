@@ -128,7 +128,7 @@ static float stored_error(float v) { return v >= 0 && v <= 1e30f ? v : -1.0f; }
 static lathe_status make_head(lathe_level_head *head, const lathe_archive_writer *writer, const lathe_packet *packets,
                               uint32_t count) {
     if (writer->next_level >= writer->header.level_count) return LATHE_ERR_RANGE;
-    if (count != lathe__header_present(&writer->header, writer->next_level)) return LATHE_ERR_RANGE;
+    if (count != lathe__header_packets(&writer->header, writer->next_level)) return LATHE_ERR_RANGE;
     for (uint32_t i = 0; i < count; i++)
         if (packets[i].size > LATHE_MAX_PACKET_BYTES) return LATHE_ERR_LIMIT;
     head->sizes = malloc((size_t)count * sizeof *head->sizes + 1);

@@ -39,6 +39,12 @@ typedef struct lathe_packet {
     size_t size;
 } lathe_packet;
 
+/* Packets of a level, in order; owned. */
+typedef struct lathe_packet_list { lathe_packet *at; uint32_t count, capacity; } lathe_packet_list;
+/* Takes over the bytes, also on failure (MEMORY). */
+lathe_status lathe__packets_add(lathe_packet_list *list, lathe_bytes *bytes);
+void lathe__packets_free(lathe_packet_list *list);
+
 /* What `info` shows. rms and max of the whole model are taken from the level records. */
 typedef struct lathe_archive_stats {
     const char *name;               /* of the model; cleaned and cut to LATHE_MODEL_NAME_MAX bytes; may be NULL */
@@ -53,8 +59,8 @@ typedef struct lathe_archive_writer lathe_archive_writer;
  * until it is closed. */
 lathe_status lathe__archive_begin(lathe_archive_writer **out, const lathe_header *header, lathe_sink sink,
                                   void *context, lathe_error *err);
-/* Writes the record of the next level (0, 1, ...). packets: one for each structure with level_count > level, in order;
- * count must be their number (RANGE). A negative error means not measured; NaN counts as such. */
+/* Writes the record of the next level (0, 1, ...). packets: lathe__header_packets of them
+ * (RANGE). A negative error means not measured; NaN counts as such. */
 lathe_status lathe__archive_level(lathe_archive_writer *writer, float error_rms_mm, float error_max_mm,
                                   const lathe_packet *packets, uint32_t count);
 /* Writes the footer, after all levels (RANGE before). */

@@ -22,6 +22,8 @@ typedef struct bake {
     lathe_arena arena[2];
     lathe_models models;
     lathe_structure_state *states;
+    lathe_pyramid pyramid;     /* unless levels are of slices */
+    lathe_packet_list packets[LATHE_MAX_LEVELS];
     double done, total;        /* voxels, for progress */
     lathe_error *err;
 } bake;
@@ -177,46 +179,137 @@ static lathe_status explain(const bake *b, size_t index, const char *what, lathe
     return status;
 }
 
-static lathe_status plan_structure(bake *b, size_t index) {
+static lathe_status extract_structure(bake *b, size_t index) {
     lathe_structure_state *state = &b->states[index];
-    lathe_baked_structure *baked = &b->baked[index];
     lathe_header_structure *h = &b->header.structures[index];
-    grey_values grey;
     lathe_status status = extract(b, index, &state->mask);
     if (status) return explain(b, index, "its region", status);
     state->level = -1;
     state->fraction = mean_fraction(b, &state->mask);
     if (!b->options->structure_count) b->header.parameters[0] = (uint32_t)state->fraction;
     state->flags = b->header.parameters[1];
-    lathe_encode_source source = source_of(b, &grey, &state->mask);
-    status = lathe__structure_plan(baked, state, b->arena, &source);
-    if (!status) status = lathe__choose_radii(baked, state, b->arena, b->volume, b->options->axis, b->boundary, &source);
-    for (uint32_t level = 0; level < baked->level_count; level++) baked->levels[level].waiting_mm3 *= voxel_mm3(b->volume);
-    h->level_count = (uint8_t)baked->level_count;
     memcpy(h->origin, state->mask.origin, sizeof h->origin);
     memcpy(h->size, state->mask.size, sizeof h->size);
+    return LATHE_OK;
+}
+
+static void scale_waiting(bake *b, size_t index) {
+    for (uint32_t level = 0; level < b->baked[index].level_count; level++)
+        b->baked[index].levels[level].waiting_mm3 *= voxel_mm3(b->volume);
+}
+
+/* Levels of slices: a kept topology, and what a radius map is chosen against. */
+static lathe_status plan_slices(bake *b, size_t index) {
+    lathe_structure_state *state = &b->states[index];
+    lathe_baked_structure *baked = &b->baked[index];
+    grey_values grey;
+    lathe_encode_source source = source_of(b, &grey, &state->mask);
+    lathe_status status = lathe__structure_plan(baked, state, b->arena, &source);
+    if (!status) status = lathe__choose_radii(baked, state, b->arena, b->volume, b->options->axis, b->boundary, &source);
+    b->header.structures[index].level_count = (uint8_t)baked->level_count;
+    scale_waiting(b, index);
     return explain(b, index, "planning", status);
+}
+
+/* Voxels of the largest structure, and their distances, along u, v and w. */
+static void schedule(bake *b) {
+    int32_t most[3] = {1, 1, 1}, frame[3];
+    double spacing[3], voxels = 0;
+    lathe__axis_frame(b->options->axis, frame);
+    for (int k = 0; k < 3; k++) spacing[k] = b->volume->spacing[frame[k]];
+    for (size_t i = 0; i < b->count; i++) {
+        const int32_t *size = b->states[i].mask.size;
+        double n = (double)(size[0] - 2) * (size[1] - 2) * size[2];
+        if (n <= voxels) continue;
+        voxels = n;
+        most[0] = size[0] - 2, most[1] = size[1] - 2, most[2] = size[2];
+    }
+    lathe__pyramid_plan(&b->header, spacing, most);
+}
+
+static lathe_status plan_pyramid(bake *b) {
+    lathe_status status = LATHE_OK;
+    b->header.parameters[1] |= LATHE_FLAG_PYRAMID;
+    schedule(b);
+    for (size_t i = 0; i < b->count; i++) b->header.structures[i].level_count = (uint8_t)(b->header.parameter_count - 1);
+    status = lathe__pyramid_read(&b->pyramid, &b->header);
+    for (size_t i = 0; !status && i < b->count; i++) {
+        b->states[i].pyramid = &b->pyramid;
+        b->states[i].flags = b->header.parameters[1];
+        b->baked[i].level_count = b->pyramid.level_count;
+        b->states[i].plan.slices = b->states[i].mask.size[2];
+        b->states[i].plan.level_count = b->pyramid.level_count;
+        status = lathe__pyramid_waiting(b->baked[i].levels, &b->states[i]);
+        scale_waiting(b, i);
+    }
+    return status;
+}
+
+static lathe_status plan(bake *b) {
+    lathe_status status = LATHE_OK;
+    bool keep = b->options->keep_topology, grey = b->boundary == LATHE_BOUNDARY_ISO && b->count == 1 && !b->options->exact;
+    for (size_t i = 0; !status && i < b->count; i++) {
+        status = extract_structure(b, i);
+        if (!status && (keep || grey)) status = plan_slices(b, i);
+        if (!status) status = tell(b, "planning", 0.2 * (double)(i + 1) / (double)b->count);
+    }
+    return status || keep || b->states[0].radii ? status : plan_pyramid(b);
 }
 
 static lathe_status encode_structure(bake *b, size_t index, uint32_t level) {
     lathe_structure_state *state = &b->states[index];
+    lathe_baked_structure *baked = &b->baked[index];
     grey_values grey;
-    if (level >= b->baked[index].level_count) return LATHE_OK;
+    if (level >= baked->level_count) return LATHE_OK;
     lathe_encode_source source = source_of(b, &grey, &state->mask);
-    return explain(b, index, "encoding", lathe__structure_encode_level(&b->baked[index], state, b->arena, &b->models, level, &source));
+    lathe_status status = lathe__structure_encode_level(baked, state, b->arena, &b->models, level, &source);
+    if (!status && lathe__packets_add(&b->packets[level], &baked->packets[level])) status = LATHE_ERR_MEMORY;
+    return explain(b, index, "encoding", status);
+}
+
+/* One structure's part of a pass; its caps behind the last one. */
+static lathe_status encode_pass(bake *b, size_t index, lathe_range_encoder *e, uint32_t level, uint32_t pass) {
+    lathe_structure_state *state = &b->states[index];
+    lathe_baked_structure *baked = &b->baked[index];
+    lathe_status status = lathe__pass_encode(e, state, &b->models, level, pass);
+    bool last = level + 1 == b->pyramid.level_count && pass + 1 == lathe__pyramid_passes(&b->pyramid, level);
+    if (!status && last && state->flags & LATHE_FLAG_CAPS) {
+        grey_values grey;
+        lathe_encode_source source = source_of(b, &grey, &state->mask);
+        state->stride[0] = state->stride[1] = state->stride[2] = 1;
+        status = lathe__choose_caps(&baked->caps, state, b->arena, &source);
+        if (!status) lathe__encode_caps(e, &baked->caps);
+    }
+    if (last) lathe__state_drop_occupancy(state);
+    return explain(b, index, "encoding", status);
+}
+
+static lathe_status encode_passes(bake *b, uint32_t level) {
+    bool shared = b->header.parameters[1] & LATHE_FLAG_SHARED;
+    lathe_status status = LATHE_OK;
+    for (uint32_t pass = 0; !status && pass < lathe__pyramid_passes(&b->pyramid, level); pass++)
+        for (size_t first = 0; !status && first < b->count;) {
+            lathe_range_encoder e;
+            lathe_bytes packet = {0};
+            lathe__encoder_start(&e);
+            do status = encode_pass(b, first++, &e, level, pass); while (!status && shared && first < b->count);
+            lathe_status coded = lathe__append_coded(&packet, &e);
+            if (!status) status = coded;
+            if (!status && lathe__packets_add(&b->packets[level], &packet)) status = LATHE_ERR_MEMORY;
+            lathe__bytes_free(&packet);
+        }
+    return status;
 }
 
 static lathe_status bake_structures(bake *b) {
-    lathe_status status = LATHE_OK;
+    lathe_status status = plan(b);
     uint32_t levels = 0;
-    for (size_t i = 0; !status && i < b->count; i++) {
-        status = plan_structure(b, i);
+    for (size_t i = 0; i < b->count; i++)
         if (b->baked[i].level_count > levels) levels = b->baked[i].level_count;
-        if (!status) status = tell(b, "planning", 0.2 * (double)(i + 1) / (double)b->count);
-    }
     if (!status) lathe__models_start(&b->models, &b->header);
     for (uint32_t level = 0; !status && level < levels; level++) {
-        for (size_t i = 0; !status && i < b->count; i++) status = encode_structure(b, i, level);
+        if (b->states[0].pyramid) status = encode_passes(b, level);
+        else for (size_t i = 0; !status && i < b->count; i++) status = encode_structure(b, i, level);
         if (!status) status = tell(b, "encoding", 0.2 + 0.2 * (level + 1) / levels);
     }
     for (size_t i = 0; !status && i < b->count; i++) {
@@ -250,13 +343,10 @@ static lathe_level_info sum_levels(const bake *b, uint32_t level) {
     return sum;
 }
 
-static lathe_status write_levels(bake *b, lathe_archive_writer *writer, const lathe_level_info *levels, lathe_packet *packets) {
+static lathe_status write_levels(bake *b, lathe_archive_writer *writer, const lathe_level_info *levels) {
     for (uint32_t level = 0; level < b->header.level_count; level++) {
-        uint32_t n = 0;
-        for (size_t s = 0; s < b->count; s++)
-            if (level < b->baked[s].level_count)
-                packets[n++] = (lathe_packet){b->baked[s].packets[level].data, b->baked[s].packets[level].size};
-        lathe_status status = lathe__archive_level(writer, levels[level].error_rms_mm, levels[level].error_max_mm, packets, n);
+        const lathe_packet_list *list = &b->packets[level];
+        lathe_status status = lathe__archive_level(writer, levels[level].error_rms_mm, levels[level].error_max_mm, list->at, list->count);
         if (status) return status;
     }
     return LATHE_OK;
@@ -265,9 +355,8 @@ static lathe_status write_levels(bake *b, lathe_archive_writer *writer, const la
 static lathe_status write_archive(bake *b, lathe_sink sink, void *context) {
     lathe_archive_writer *writer = NULL;
     lathe_level_info levels[LATHE_MAX_LEVELS];
-    lathe_packet *packets = calloc(b->count + 1, sizeof *packets);
     const lathe_level_info **structures = calloc(b->count + 1, sizeof(void *));
-    lathe_status status = packets && structures ? LATHE_OK : LATHE_ERR_MEMORY;
+    lathe_status status = structures ? LATHE_OK : LATHE_ERR_MEMORY;
     if (!status) status = lathe__archive_begin(&writer, &b->header, sink, context, b->err);
     for (size_t s = 0; !status && s < b->count; s++) {
         structures[s] = b->baked[s].levels;
@@ -275,7 +364,7 @@ static lathe_status write_archive(bake *b, lathe_sink sink, void *context) {
     }
     if (!status) {
         for (uint32_t level = 0; level < b->header.level_count; level++) levels[level] = sum_levels(b, level);
-        status = write_levels(b, writer, levels, packets);
+        status = write_levels(b, writer, levels);
     }
     if (!status) {
         lathe_archive_stats stats = {.name = b->options->name, .iso = b->options->structure_count ? (double)NAN : b->options->iso,
@@ -283,7 +372,6 @@ static lathe_status write_archive(bake *b, lathe_sink sink, void *context) {
         status = lathe__archive_finish(writer, &stats);
     }
     lathe__archive_close(&writer);
-    free(packets);
     free(structures);
     return status;
 }
@@ -333,6 +421,7 @@ lathe_status lathe_bake(const lathe_volume *volume, const lathe_bake_options *op
     if (!status) status = tell(&b, "writing", 1);
     if (!status) status = write_archive(&b, sink, context);
     if (status && err && !err->text[0]) lathe_fail(err, status, "writing the archive: %s", lathe_status_name(status));
+    for (int i = 0; i < LATHE_MAX_LEVELS; i++) lathe__packets_free(&b.packets[i]);
     for (size_t i = 0; b.baked && i < b.count; i++) lathe__baked_free(&b.baked[i]);
     for (size_t i = 0; b.states && i < b.count; i++) lathe__state_free(&b.states[i]);
     free(b.states);

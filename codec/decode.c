@@ -17,11 +17,15 @@ struct lathe_decoder {
     uint32_t next_structure;
     lathe_structure_state *states;
     lathe_models models;
+    lathe_pyramid pyramid;
+    lathe_range_decoder code;  /* of a pyramid's packet that is being decoded */
+    uint8_t *open;             /* its bytes: SHARED, structure by structure; NULL: none */
+    bool every_pass;
     lathe_transform *transforms;
     lathe_arena arena[2];
-    lathe_mesh mesh;           /* of mesh_of at its level, if mesh_level >= 0 */
+    lathe_mesh mesh;           /* of mesh_of at its level, if has_mesh */
     uint32_t mesh_of;
-    int32_t mesh_level;
+    bool has_mesh;
     lathe_surface_counts counts;
     uint32_t shown;
     lathe_status failure;
@@ -32,7 +36,7 @@ lathe_status lathe_decoder_open(lathe_decoder **out) {
     lathe_decoder *d = calloc(1, sizeof *d);
     if (!d) return LATHE_ERR_MEMORY;
     d->build = true;
-    d->mesh_level = -1;
+    d->has_mesh = false;
     d->fault = "";
     *out = d;
     return LATHE_OK;
@@ -46,6 +50,7 @@ void lathe_decoder_close(lathe_decoder **decoder) {
     free(d->states);
     free(d->transforms);
     free(d->bytes);
+    free(d->open);
     lathe__header_free(&d->header);
     lathe__level_head_free(&d->head);
     lathe__arena_free(&d->arena[0]);
@@ -87,6 +92,8 @@ static lathe_status start_structures(lathe_decoder *d) {
     d->transforms = calloc(n, sizeof *d->transforms);
     if (!d->states || !d->transforms) return LATHE_ERR_MEMORY;
     lathe__models_start(&d->models, &d->header);
+    bool pyramid = lathe__header_flags(&d->header) & LATHE_FLAG_PYRAMID;
+    if (pyramid && lathe__pyramid_read(&d->pyramid, &d->header)) return LATHE_ERR_FORMAT;
     for (uint32_t i = 0; i < n; i++) {
         const lathe_header_structure *h = &d->header.structures[i];
         lathe_structure_state *s = &d->states[i];
@@ -97,7 +104,8 @@ static lathe_status start_structures(lathe_decoder *d) {
         s->mask.row_words = (h->size[0] + 63) / 64;
         s->plan = (lathe_level_plan){.slices = h->size[2], .level_count = h->level_count};
         s->fraction = d->header.parameter_count ? (int)(d->header.parameters[0] & 63) : LATHE_FRACTION_ONE / 2;
-        s->flags = d->header.parameter_count > 1 ? d->header.parameters[1] : 0;
+        s->flags = lathe__header_flags(&d->header);
+        s->pyramid = pyramid ? &d->pyramid : NULL;
         s->level = -1;
         d->transforms[i] = lathe__mask_transform(&s->mask, d->header.axis, d->header.affine);
     }
@@ -136,47 +144,86 @@ static lathe_status next_packet(lathe_decoder *d, const uint8_t **payload, uint3
     return LATHE_OK;
 }
 
-lathe_status lathe_decoder_step(lathe_decoder *d, lathe_step *step) {
-    if (d->failure) return d->failure;
-    const uint8_t *payload;
-    uint32_t size;
-    lathe_status status = next_packet(d, &payload, &size);
+/* ---- steps: a packet of one structure, or one structure's part of a packet ---- */
+
+static void end_packet(lathe_decoder *d) {
+    free(d->open);
+    d->open = NULL;
+    if (++d->next_packet < d->head.count) return;
+    d->has_level = false;
+    lathe__level_head_free(&d->head);
+}
+
+/* Structure by structure of a packet of SHARED models, which is kept meanwhile. */
+static lathe_status shared_step(lathe_decoder *d, const uint8_t *payload, uint32_t size, const char **fault) {
+    if (!d->open) {
+        d->open = malloc((size_t)size + 1);
+        if (!d->open) return LATHE_ERR_MEMORY;
+        memcpy(d->open, payload, size);
+        lathe__decoder_start(&d->code, d->open, size);
+    }
+    return lathe__pass_decode(&d->states[d->next_structure], &d->code, &d->models, d->head.level, fault);
+}
+
+static lathe_status single_step(lathe_decoder *d, const uint8_t *payload, uint32_t size, const char **fault) {
+    lathe_structure_state *state = &d->states[d->next_structure];
+    if (!state->pyramid) return lathe__structure_decode(state, &d->arena[0], &d->models, d->head.level, payload, size, fault);
+    lathe__decoder_start(&d->code, payload, size);
+    return lathe__pass_decode(state, &d->code, &d->models, d->head.level, fault);
+}
+
+/* Decodes a part; *step says whose. */
+static lathe_status next_step(lathe_decoder *d, lathe_step *step) {
+    const uint8_t *payload = NULL;
+    uint32_t size = 0;
+    lathe_status status = d->open ? LATHE_OK : next_packet(d, &payload, &size);
     if (status) return status;
     while (d->header.structures[d->next_structure].level_count <= d->head.level) d->next_structure++;
-    uint32_t s = d->next_structure++;
+    uint32_t s = d->next_structure;
     lathe_structure_state *state = &d->states[s];
     const char *fault = LATHE_FAULT("");
-    status = lathe__structure_decode(state, &d->arena[0], &d->models, d->head.level, payload, size, &fault);
+    bool shared = state->pyramid && state->flags & LATHE_FLAG_SHARED;
+    d->has_mesh = false;
+    status = shared ? shared_step(d, payload, size, &fault) : single_step(d, payload, size, &fault);
     lathe__arena_reset(&d->arena[0]);
     if (status) return fail(d, status, fault);
-    d->mesh_level = -1;
-    *step = (lathe_step){.structure = s, .level = d->head.level, .error_rms_mm = d->head.error_rms_mm, .error_max_mm = d->head.error_max_mm};
-    if (++d->next_packet == d->head.count) {
-        d->has_level = false;
-        lathe__level_head_free(&d->head);
-    }
+    uint32_t left = state->level == (int32_t)d->head.level ? 0 : lathe__pyramid_passes(&d->pyramid, d->head.level) - state->pass;
+    *step = (lathe_step){.structure = s, .level = d->head.level, .error_rms_mm = d->head.error_rms_mm,
+                         .error_max_mm = d->head.error_max_mm, .passes_left = left};
+    if (++d->next_structure == d->header.structure_count && state->pyramid) d->next_structure = 0;
+    if (!shared || !d->next_structure) end_packet(d);
+    return LATHE_OK;
+}
+
+lathe_status lathe_decoder_step(lathe_decoder *d, lathe_step *step) {
+    if (d->failure) return d->failure;
+    do {
+        lathe_status status = next_step(d, step);
+        if (status) return status;
+    } while (step->passes_left && !d->every_pass);
     if (d->build) {
-        if (!lathe_decoder_mesh(d, s)) return d->failure;
+        if (!lathe_decoder_mesh(d, step->structure)) return d->failure;
         step->rays = d->counts.rays;
         step->slices = d->shown;
     }
     return LATHE_OK;
 }
 
+void lathe_decoder_every_pass(lathe_decoder *d, bool every) { d->every_pass = every; }
 void lathe_decoder_build_meshes(lathe_decoder *d, bool build) { d->build = build; }
 
 const lathe_mesh *lathe_decoder_mesh(lathe_decoder *d, uint32_t structure) {
-    if (!d->has_header || structure >= d->header.structure_count || d->states[structure].level < 0) return NULL;
-    if (d->mesh_level == d->states[structure].level && d->mesh_of == structure) return &d->mesh;
+    if (!d->has_header || structure >= d->header.structure_count || !lathe__state_known(&d->states[structure])) return NULL;
+    if (d->has_mesh && d->mesh_of == structure) return &d->mesh;
     lathe_mesh_free(&d->mesh);
-    d->mesh_level = -1;
+    d->has_mesh = false;
     lathe_status status = lathe__state_mesh(&d->mesh, d->arena, &d->states[structure], &d->counts, &d->shown);
     if (status) {
         fail(d, status, LATHE_FAULT("the surface cannot be built"));
         return NULL;
     }
     d->mesh_of = structure;
-    d->mesh_level = d->states[structure].level;
+    d->has_mesh = true;
     return &d->mesh;
 }
 

@@ -18,6 +18,7 @@ typedef struct lathe_step {
     uint32_t structure, level;
     float error_rms_mm, error_max_mm;   /* of the whole model at this level, as measured at bake time; negative: not measured */
     uint32_t rays, slices;              /* most rays of any contour, slices shown, of this structure at this level */
+    uint32_t passes_left;               /* until the level is whole: 0, unless every pass is asked for */
 } lathe_step;
 lathe_status lathe_decoder_open(lathe_decoder **out);
 void lathe_decoder_close(lathe_decoder **decoder);
@@ -28,7 +29,9 @@ lathe_status lathe_decoder_feed(lathe_decoder *decoder, const uint8_t *bytes, si
 lathe_status lathe_decoder_step(lathe_decoder *decoder, lathe_step *step);
 /* Build a mesh at each step (the default), or only decode (false): then lathe_decoder_mesh builds on demand. */
 void lathe_decoder_build_meshes(lathe_decoder *decoder, bool build);
-/* The structure's mesh at its latest level; valid until the next step or close. NULL (and FORMAT in the error) if the level
+/* Stop behind every pass of a level, not only where one is whole: lathe_step.passes_left tells. */
+void lathe_decoder_every_pass(lathe_decoder *decoder, bool every);
+/* The structure's mesh at its latest level or pass; valid until the next step or close. NULL (and FORMAT in the error) if the level
  * cannot be built from hostile input. */
 const lathe_mesh *lathe_decoder_mesh(lathe_decoder *decoder, uint32_t structure);
 const lathe_transform *lathe_decoder_transform(const lathe_decoder *decoder, uint32_t structure);
@@ -72,7 +75,7 @@ typedef struct lathe_model_info {
     bool keep_topology;            /* every level has the topology of the last */
     bool caps;                     /* caps of the last level have coded shapes */
     bool exact;                    /* no structure is a radius map */
-    bool independent;              /* each structure can be decoded alone */
+    bool independent, pyramid;     /* each structure can be decoded alone; levels are lattices, not slices */
     /* Of the whole model at each level: area-weighted RMS, largest max (negative: not measured), and totals. */
     const lathe_level_info *levels;
 } lathe_model_info;

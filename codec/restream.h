@@ -5,7 +5,7 @@
 
 /* The packets of one structure as if it were a model of its own; packets are the caller's to free, also on failure. Costs decoding
  * the stream and encoding the structure. Errors of the decoder; MEMORY. */
-lathe_status lathe__restream(lathe_bytes packets[LATHE_MAX_LEVELS], const lathe_model *model, uint32_t structure, uint32_t level_count);
+lathe_status lathe__restream(lathe_packet_list packets[LATHE_MAX_LEVELS], const lathe_model *model, uint32_t structure, uint32_t level_count);
 
 /* decode.c: what a decoder knows of a structure; its own. */
 lathe_structure_state *lathe__decoder_state(lathe_decoder *decoder, uint32_t structure);

@@ -40,7 +40,7 @@ static lathe_status decode_stars(lathe_structure_state *state, lathe_range_decod
 }
 
 /* The shapes of the caps are read when the mesh is built: only then it is known which caps there are. */
-static lathe_status keep_caps(lathe_structure_state *state, const lathe_range_decoder *d) {
+lathe_status lathe__keep_caps(lathe_structure_state *state, const lathe_range_decoder *d) {
     size_t size = (size_t)(d->end - d->at);
     uint8_t *bytes = state->cap_bytes = LATHE_NEW(&state->arena, uint8_t, size + 1);
     if (!bytes) return LATHE_ERR_MEMORY;
@@ -80,7 +80,7 @@ static lathe_status decode_slices(lathe_structure_state *state, lathe_arena *scr
     lathe__mask_free(&state->estimate);
     if (level + 1 < state->plan.level_count) return status;
     lathe__state_drop_occupancy(state);
-    return status || !(state->flags & LATHE_FLAG_CAPS) ? status : keep_caps(state, d);
+    return status || !(state->flags & LATHE_FLAG_CAPS) ? status : lathe__keep_caps(state, d);
 }
 
 static int32_t get_number(void *coder, lathe_number_model *model, int32_t number) {

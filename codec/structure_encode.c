@@ -18,13 +18,19 @@ lathe_status lathe__encoded_mesh(lathe_mesh *out, lathe_arena arena[2], lathe_st
     state->level = (int32_t)level;
     state->finer = baked->finer[level];
     state->caps = replay.count ? &replay.caps : NULL;
-    lathe_status status = lathe__state_mesh(out, arena, state, counts, shown);
+    lathe_status status = LATHE_OK;
+    if (state->pyramid) {
+        lathe__pyramid_strides(state->stride, state->pyramid, level, level ? lathe__pyramid_passes(state->pyramid, level) : 0);
+        if (level + 1 < state->pyramid->level_count) status = lathe__pyramid_sample(&state->lattice, &state->mask, state->stride);
+    }
+    if (!status) status = lathe__state_mesh(out, arena, state, counts, shown);
+    lathe__mask_free(&state->lattice);
     state->finer = NULL;
     state->caps = NULL;
     return status;
 }
 
-static lathe_status append_coded(lathe_bytes *out, lathe_range_encoder *e) {
+lathe_status lathe__append_coded(lathe_bytes *out, lathe_range_encoder *e) {
     lathe__encoder_finish(e);
     if (!e->failed) lathe__emit(out, e->bytes, e->size);
     bool failed = e->failed || out->failed;
@@ -141,7 +147,7 @@ lathe_status lathe__structure_encode_level(lathe_baked_structure *out, lathe_str
     if (level == 0 && !(state->flags & LATHE_FLAG_EXACT)) lathe__encode_bit(&e, LATHE_RADIUS_CHANCE, state->radii != NULL);
     if (state->radii) {
         status = encode_radii(&e, state, out->truth, level);
-        lathe_status coded = append_coded(&out->packets[level], &e);
+        lathe_status coded = lathe__append_coded(&out->packets[level], &e);
         return status ? status : coded;
     }
     if (level == 0) {
@@ -159,7 +165,7 @@ lathe_status lathe__structure_encode_level(lathe_baked_structure *out, lathe_str
         status = lathe__choose_caps(&out->caps, state, arena, source);
         if (!status) lathe__encode_caps(&e, &out->caps);
     }
-    lathe_status appended = append_coded(&out->packets[level], &e);
+    lathe_status appended = lathe__append_coded(&out->packets[level], &e);
     if (level + 1 == out->level_count) lathe__state_drop_occupancy(state);
     return status ? status : appended;
 }

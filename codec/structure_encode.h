@@ -35,6 +35,8 @@ void lathe__baked_free(lathe_baked_structure *baked);
 /* Takes a state whose mask is the whole structure, and its fraction and flags; chooses its plan, says what waits. */
 lathe_status lathe__structure_plan(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2],
                                    const lathe_encode_source *source);
+/* Ends and frees the coder. */
+lathe_status lathe__append_coded(lathe_bytes *out, lathe_range_encoder *e);
 /* The base shape of the state's mask, with its plan. */
 lathe_status lathe__fit_stars(lathe_structure_state *state, lathe_arena *scratch);
 /* Fills the packet of a level: in ascending order; with SHARED models, level by level and structure by structure as they are sent.
@@ -45,6 +47,11 @@ lathe_status lathe__structure_encode_level(lathe_baked_structure *out, lathe_str
  * three quarters of the bytes of slices. After the plan. */
 lathe_status lathe__choose_radii(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2], const lathe_volume *volume,
                                  lathe_axis axis, lathe_boundary boundary, const lathe_encode_source *source);
+/* pyramid_encode.c: one pass of a structure into its packet: level by level, pass by pass; with SHARED models structure by structure. */
+lathe_status lathe__pass_encode(lathe_range_encoder *e, lathe_structure_state *state, lathe_models *models, uint32_t level, uint32_t pass);
+/* Writes the schedule into the header's parameters from 2 on. Passes halve the longest stride; spacing: of the permuted axes, in mm;
+ * most: voxels of the largest structure. */
+void lathe__pyramid_plan(lathe_header *header, const double spacing[3], const int32_t most[3]);
 /* The mesh of a level, from the encoder's state. */
 lathe_status lathe__encoded_mesh(lathe_mesh *out, lathe_arena arena[2], lathe_structure_state *state, const lathe_baked_structure *baked,
                                  uint32_t level, lathe_surface_counts *counts, uint32_t *shown);
@@ -59,6 +66,9 @@ lathe_status lathe__begin_early(lathe_structure_state *state, double slice_ratio
 /* Fills components, waiting ones and their volume in voxels (as waiting_mm3) of each level. A component is shown if a shown slice
  * has voxels of it; at a level of stars, if the middle of a row of its pixels lies within the stars. */
 lathe_status lathe__count_waiting(lathe_level_info *levels, const lathe_structure_state *state, lathe_arena *arena);
+
+/* The same of a pyramid, whose levels show a component if a sample is in it. */
+lathe_status lathe__pyramid_waiting(lathe_level_info *levels, const lathe_structure_state *state);
 
 /* ---- structure_keep.c: every level with the topology of the last ---- */
 

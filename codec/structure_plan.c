@@ -39,9 +39,11 @@ typedef struct star_probe {
     int32_t *outline_of;       /* slice -> outline, or -1 */
 } star_probe;
 
-static bool within_stars(const void *context, int32_t u, int32_t v, int32_t w) {
+/* The middle of the run. */
+static uint32_t within_stars(const void *context, int32_t first, int32_t last, int32_t v, int32_t w) {
     const star_probe *probe = context;
-    if (probe->outline_of[w] < 0) return false;
+    if (probe->outline_of[w] < 0) return 0;
+    int32_t u = first + (last - first) / 2;
     const lathe_outline *o = &probe->outlines[probe->outline_of[w]];
     lathe_point at = {u * LATHE_LATTICE_ONE, v * LATHE_LATTICE_ONE};
     bool odd = false;
@@ -85,7 +87,7 @@ static void count_level(lathe_level_info *info, const lathe_structure_state *sta
 
 lathe_status lathe__count_waiting(lathe_level_info *levels, const lathe_structure_state *state, lathe_arena *arena) {
     star_probe stars = {NULL, NULL};
-    lathe_probe probe = {within_stars, &stars};
+    lathe_probe probe = {within_stars, &stars, 1};
     lathe_component *components = NULL;
     size_t count = 0;
     int32_t *next = LATHE_NEW(arena, int32_t, state->plan.slices);
@@ -96,4 +98,41 @@ lathe_status lathe__count_waiting(lathe_level_info *levels, const lathe_structur
     free(components);
     lathe__arena_reset(arena);
     return status;
+}
+
+/* ---- the same of a pyramid ---- */
+
+/* A bit for each level whose lattice has a pixel of the run. */
+static uint32_t on_lattices(const void *context, int32_t first, int32_t last, int32_t v, int32_t w) {
+    const lathe_pyramid *pyramid = context;
+    uint32_t found = 0;
+    for (uint32_t level = 0; level < pyramid->level_count; level++) {
+        int32_t stride[3];
+        lathe__pyramid_strides(stride, pyramid, level, level ? lathe__pyramid_passes(pyramid, level) : 0);
+        if (v % stride[1] || w % stride[2] || (first + stride[0] - 1) / stride[0] * stride[0] > last) continue;
+        found |= 1u << level;
+    }
+    return found;
+}
+
+lathe_status lathe__pyramid_waiting(lathe_level_info *levels, const lathe_structure_state *state) {
+    const lathe_pyramid *pyramid = state->pyramid;
+    lathe_probe probe = {on_lattices, pyramid, (1u << pyramid->level_count) - 1};
+    lathe_component *components;
+    size_t count;
+    lathe_status status = lathe__find_components(&components, &count, &state->mask, &probe);
+    if (status) return status;
+    for (uint32_t level = 0; level < pyramid->level_count; level++) {
+        lathe_level_info *info = &levels[level];
+        info->components = info->components_waiting = 0;
+        info->waiting_mm3 = 0;
+        for (size_t i = 0; i < count; i++) {
+            bool shown = components[i].found >> level & 1;
+            info->components += shown;
+            info->components_waiting += !shown;
+            if (!shown) info->waiting_mm3 += (double)components[i].voxels;
+        }
+    }
+    free(components);
+    return LATHE_OK;
 }

@@ -4,6 +4,7 @@
 void lathe__state_free(lathe_structure_state *state) {
     lathe__mask_free(&state->mask);
     lathe__mask_free(&state->estimate);
+    lathe__mask_free(&state->lattice);
     free((void *)(uintptr_t)state->plan.early);
     free(state->finer);
     state->plan.early = NULL;
@@ -186,11 +187,29 @@ static lathe_status base_mesh(lathe_mesh *out, lathe_arena arena[2], const lathe
     return lathe__stack_outlines(out, &arena[1], outlines, slices, count, false, counts);
 }
 
+lathe_status lathe__state_slices(int32_t **out, uint32_t *count, lathe_arena *arena, const lathe_structure_state *state) {
+    if (!state->pyramid) return lathe__level_slices(out, count, arena, &state->plan, (uint32_t)state->level);
+    int32_t stride = state->stride[2];
+    *count = (uint32_t)((state->mask.size[2] - 1) / stride) + 1;
+    *out = LATHE_NEW(arena, int32_t, *count);
+    for (uint32_t i = 0; *out && i < *count; i++) (*out)[i] = (int32_t)i * stride;
+    return *out ? LATHE_OK : LATHE_ERR_MEMORY;
+}
+
+/* Vertices lie where the grey values cross on average; where strides are larger than a voxel, that is the middle. */
+static lathe_status lattice_mesh(lathe_mesh *out, lathe_arena arena[2], const lathe_structure_state *state, lathe_caps *caps,
+                                 lathe_surface_counts *counts) {
+    const lathe_mask *lattice = state->lattice.bits ? &state->lattice : &state->mask;
+    bool whole = lattice == &state->mask;
+    lathe_surface_style style = {.fraction = whole ? state->fraction : LATHE_FRACTION_ONE / 2, .caps = whole ? caps : NULL};
+    return lathe__pyramid_mesh(out, arena, lattice, state->stride, state->mask.size, &style, counts);
+}
+
 lathe_status lathe__state_mesh(lathe_mesh *out, lathe_arena arena[2], const lathe_structure_state *state,
                                lathe_surface_counts *counts, uint32_t *shown) {
     int32_t *slices;
     *counts = (lathe_surface_counts){0};
-    if (state->level < 0) return LATHE_ERR_RANGE;
+    if (!lathe__state_known(state)) return LATHE_ERR_RANGE;
     if (state->radii) {
         int32_t stride = lathe__level_stride(&state->plan, (uint32_t)state->level);
         counts->rays = state->radii->rays / lathe__radius_ray_stride(state->radii, (uint32_t)state->level);
@@ -199,14 +218,16 @@ lathe_status lathe__state_mesh(lathe_mesh *out, lathe_arena arena[2], const lath
         return lathe__radius_mesh(out, state->radii, (uint32_t)state->level);
     }
     lathe_arena list = {0};
-    lathe_status status = lathe__level_slices(&slices, shown, &list, &state->plan, (uint32_t)state->level);
+    lathe_status status = lathe__state_slices(&slices, shown, &list, state);
     if (!status) {
         cap_reader reader = {.caps = {read_shape}, .code = state->cap_code};
         lathe__number_start(reader.models, LATHE_CAP_MODELS, LATHE_NUMBER_START);
         bool last = (uint32_t)state->level + 1 == state->plan.level_count;
+        lathe_caps *caps = state->cap_bytes ? &reader.caps : state->caps;
         lathe_surface_style style = {.fraction = state->fraction, .coarseness = state->plan.level_count - 1 - (uint32_t)state->level,
-                                     .finer = state->finer, .caps = !last ? NULL : state->cap_bytes ? &reader.caps : state->caps};
-        if (!state->level && !state->exact_base) status = base_mesh(out, arena, state, slices, *shown, counts);
+                                     .finer = state->finer, .caps = last ? caps : NULL};
+        if (state->pyramid) status = lattice_mesh(out, arena, state, caps, counts);
+        else if (!state->level && !state->exact_base) status = base_mesh(out, arena, state, slices, *shown, counts);
         else status = lathe__build_styled(out, arena, &state->mask, slices, *shown, &style, counts);
     }
     lathe__arena_reset(&arena[0]);

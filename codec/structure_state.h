@@ -5,6 +5,7 @@
 #include "base_shape.h"
 #include "level.h"
 #include "occupancy.h"
+#include "pyramid.h"
 #include "radius_map.h"
 
 /* What adapts while packets are coded. One for a model if it is SHARED; else the occupancy is a template, and each structure starts
@@ -29,12 +30,18 @@ typedef struct lathe_structure_state {
     lathe_star_slice *base;    /* one for each slice of level 0 */
     lathe_occupancy *occupancy; /* owned, unless SHARED */
     lathe_mask estimate;       /* the base shape's slices as pixels, while level 1 is coded */
+    const lathe_pyramid *pyramid; /* levels are lattices: `mask` has bits when the last one is whole. NULL: levels of slices */
+    lathe_mask lattice;        /* what is known, unless it is all */
+    int32_t stride[3];         /* of the lattice */
+    uint32_t pass;             /* passes known of level + 1 */
     lathe_radius_map *radii;   /* in the arena: the structure is a radius map, and has neither mask nor base */
     lathe_range_decoder cap_code; /* the last packet from its caps on */
     uint8_t *cap_bytes;        /* in the arena; NULL: caps rise half a voxel */
     lathe_caps *caps;          /* instead of the code: an encoder's */
 } lathe_structure_state;
 
+/* Is there anything to show? */
+static inline bool lathe__state_known(const lathe_structure_state *state) { return state->level >= 0 || state->lattice.bits; }
 void lathe__state_free(lathe_structure_state *state);
 
 /* The first level whose packet has slices. */
@@ -55,6 +62,8 @@ typedef struct lathe_new_slice { int32_t slice; lathe_known known; } lathe_new_s
 lathe_status lathe__new_slices(lathe_new_slice **out, uint32_t *count, lathe_arena *arena, const lathe_structure_state *state,
                                uint32_t level);
 
+/* The slices that the surface shows now, ascending; *out is arena memory. */
+lathe_status lathe__state_slices(int32_t **out, uint32_t *count, lathe_arena *arena, const lathe_structure_state *state);
 /* The surface at state->level. arena: two scratch arenas, left reset. */
 lathe_status lathe__state_mesh(lathe_mesh *out, lathe_arena arena[2], const lathe_structure_state *state,
                                lathe_surface_counts *counts, uint32_t *shown);
@@ -71,6 +80,11 @@ lathe_status lathe__state_estimate(lathe_structure_state *state, lathe_arena *sc
 enum { LATHE_RADIUS_CHANCE = 1 << 13, LATHE_RADIUS_MOST_STEP = 1 << 16 };
 lathe_status lathe__radius_head(lathe_radius_map *map, const lathe_structure_state *state, lathe_arena *arena, const lathe_number_coder *coder);
 
+/* pyramid_decode.c: one pass of level `level` (the state's level + 1, and its next pass). The level is the state's after its last one. */
+lathe_status lathe__pass_decode(lathe_structure_state *state, lathe_range_decoder *d, lathe_models *models, uint32_t level,
+                                const char **fault);
+/* structure_decode.c: the rest of a packet is the shapes of its caps. */
+lathe_status lathe__keep_caps(lathe_structure_state *state, const lathe_range_decoder *d);
 /* structure_decode.c: one packet: the state moves to `level` (its level + 1). */
 lathe_status lathe__structure_decode(lathe_structure_state *state, lathe_arena *scratch, lathe_models *models, uint32_t level,
                                      const uint8_t *payload, size_t size, const char **fault);

@@ -41,7 +41,7 @@ static uint32_t unite(parts *p, uint32_t a, uint32_t b) {
     if (from->first_slice < to->first_slice) to->first_slice = from->first_slice;
     if (from->last_slice > to->last_slice) to->last_slice = from->last_slice;
     to->voxels += from->voxels;
-    to->found = to->found || from->found;
+    to->found |= from->found;
     return a;
 }
 
@@ -133,7 +133,7 @@ static lathe_status join_slice(parts *p, slice_runs *here, const slice_runs *bef
             lathe_component *c = &p->of[find_root(p->parent, r->part)];
             c->voxels += r->last - r->first + 1;
             c->last_slice = w; /* slices come in order */
-            if (probe && !c->found) c->found = probe->look(probe->context, r->first + (r->last - r->first) / 2, v, w);
+            if (probe && c->found != probe->all) c->found |= probe->look(probe->context, r->first, r->last, v, w);
         }
     }
     return LATHE_OK;

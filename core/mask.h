@@ -51,12 +51,17 @@ lathe_status lathe__region_label_box(lathe_mask *out, const lathe_volume *volume
 lathe_axis lathe__axis_auto(const lathe_volume *volume);
 
 /* ---- components.c: what lies where, by 6-connectivity (background: 26) ---- */
-typedef struct lathe_component { int32_t first_slice, last_slice; int64_t voxels; bool found; } lathe_component;
+typedef struct lathe_component { int32_t first_slice, last_slice; int64_t voxels; uint32_t found; } lathe_component;
 /* The 6-connected components, in order of their first pixel (w, v, u); *out is malloc'ed. */
 lathe_status lathe__mask_components(lathe_component **out, size_t *count, const lathe_mask *mask);
 
-/* Asked for the middle pixel of runs; a component is found if it says true for one of its runs. */
-typedef struct lathe_probe { bool (*look)(const void *context, int32_t u, int32_t v, int32_t w); const void *context; } lathe_probe;
+/* Asked for runs of pixels first .. last of row v; a component is found by what it says of any of its runs, bit by bit. It is not
+ * asked again where all bits are found. */
+typedef struct lathe_probe {
+    uint32_t (*look)(const void *context, int32_t first, int32_t last, int32_t v, int32_t w);
+    const void *context;
+    uint32_t all;
+} lathe_probe;
 lathe_status lathe__find_components(lathe_component **out, size_t *count, const lathe_mask *mask, const lathe_probe *probe);
 
 typedef struct lathe_topology {

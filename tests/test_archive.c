@@ -151,7 +151,7 @@ static const lathe_header sample = {
     .boundary = LATHE_BOUNDARY_EDGE,
     .affine = {{-1, 0, 0, 90}, {0, 1, 0, -126}, {0, 0, 0.1, -72}}, /* 0.1 needs doubles */
     .parameter_count = 3,
-    .parameters = {0, 123, UINT32_MAX},
+    .parameters = {0, 107, UINT32_MAX},
     .structure_count = STRUCTURES,
     .structures = structures,
 };

@@ -223,10 +223,20 @@ static void compare_with_state(const phantom *p, const lathe_model *model, const
     if (lathe__header_parse(&header, &reader)) abort();
     state.fraction = (int)header.parameters[0];
     state.flags = header.parameter_count > 1 ? header.parameters[1] & ~(uint32_t)LATHE_FLAG_SHARED : 0;
-    CHECK(lathe__structure_plan(&baked, &state, arena, &source) == LATHE_OK);
-    CHECK(lathe__choose_radii(&baked, &state, arena, volume, p->axis, header.boundary, &source) == LATHE_OK);
-    for (uint32_t level = 0; level < baked.level_count; level++)
-        CHECK(lathe__structure_encode_level(&baked, &state, arena, &models, level, &source) == LATHE_OK);
+    lathe_pyramid pyramid;
+    if (state.flags & LATHE_FLAG_PYRAMID) {
+        CHECK_EQ(lathe__pyramid_read(&pyramid, &header), LATHE_OK);
+        state.pyramid = &pyramid;
+        state.plan = (lathe_level_plan){state.mask.size[2], pyramid.level_count, NULL};
+        baked.level_count = pyramid.level_count;
+        for (int k = 0; k < 3; k++) state.stride[k] = 1;
+        if (state.flags & LATHE_FLAG_CAPS) CHECK_EQ(lathe__choose_caps(&baked.caps, &state, arena, &source), LATHE_OK);
+    } else {
+        CHECK(lathe__structure_plan(&baked, &state, arena, &source) == LATHE_OK);
+        CHECK(lathe__choose_radii(&baked, &state, arena, volume, p->axis, header.boundary, &source) == LATHE_OK);
+        for (uint32_t level = 0; level < baked.level_count; level++)
+            CHECK(lathe__structure_encode_level(&baked, &state, arena, &models, level, &source) == LATHE_OK);
+    }
     lathe_volume_close(&volume);
     lathe_transform transform = lathe__mask_transform(&state.mask, p->axis, header.affine);
     uint32_t levels = 0;

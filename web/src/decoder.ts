@@ -49,11 +49,11 @@ export class Decoder {
 
     mesh(structure: number) {
         this.#check(this.#wasm.mesh(structure));
-        const [, , , , , , vertices, triangles, start] = this.#report();
+        const [, , , , , , , vertices, triangles, start] = this.#report();
         // A copy: the module's memory is replaced when it grows.
         const buffer = this.#wasm.memory.buffer.slice(start, start + vertices * 20 + triangles * 12) as ArrayBuffer;
         return { vertices, triangles, buffer };
     }
 
-    #report = () => new Uint32Array(this.#wasm.memory.buffer, this.#wasm.report_words(), 9);
+    #report = () => new Uint32Array(this.#wasm.memory.buffer, this.#wasm.report_words(), 10);
 }

@@ -27,7 +27,7 @@ function stepAll(wasm, each = () => {}) {
     for (;;) {
         const status = wasm.step();
         if (status) return status;
-        each(...new Uint32Array(wasm.memory.buffer, wasm.report_words(), 9));
+        each(...new Uint32Array(wasm.memory.buffer, wasm.report_words(), 10));
     }
 }
 
@@ -70,7 +70,7 @@ test('meshes for the GPU: closed, unit normals, openness between 0 and 1', async
     feed(wasm, stream);
     stepAll(wasm, (structure) => {
         assert.equal(wasm.mesh(structure), 0);
-        const [, , , , , , vertices, triangles, start] = new Uint32Array(wasm.memory.buffer, wasm.report_words(), 9);
+        const [, , , , , , , vertices, triangles, start] = new Uint32Array(wasm.memory.buffer, wasm.report_words(), 10);
         const memory = wasm.memory.buffer;
         const positions = new Float32Array(memory, start, 3 * vertices);
         const shading = new Int16Array(memory, start + 12 * vertices, 4 * vertices);
@@ -94,7 +94,7 @@ test('the normals of a ball point outwards', async () => {
     feed(wasm, stream);
     stepAll(wasm);
     wasm.mesh(0);
-    const [, , , , , , vertices, , start] = new Uint32Array(wasm.memory.buffer, wasm.report_words(), 9);
+    const [, , , , , , , vertices, , start] = new Uint32Array(wasm.memory.buffer, wasm.report_words(), 10);
     const positions = new Float32Array(wasm.memory.buffer, start, 3 * vertices);
     const shading = new Int16Array(wasm.memory.buffer, start + 12 * vertices, 4 * vertices);
     const centre = [12, 24, 24 * 1.2];

@@ -9,11 +9,11 @@
 
 /* What the last step and the last mesh gave; the viewer reads it as 32-bit words. */
 static struct {
-    lathe_step step;           /* words 0-5: structure, level, rms, max (floats), rays, slices */
+    lathe_step step;           /* words 0-6: structure, level, rms, max (floats), rays, slices, passes left */
     uint32_t vertex_count, triangle_count;
-    void *mesh;                /* word 8: 3 floats, then 4 int16 for each vertex, then 3 uint32 for each triangle */
+    void *mesh;                /* word 9: 3 floats, then 4 int16 for each vertex, then 3 uint32 for each triangle */
 } report;
-_Static_assert(sizeof report == 36, "the viewer counts on the words of the report");
+_Static_assert(sizeof report == 40, "the viewer counts on the words of the report");
 
 static lathe_decoder *decoder;
 static uint8_t *input_bytes;

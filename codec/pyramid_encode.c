@@ -1,0 +1,92 @@
+/* Passes of a pyramid from the whole mask, and the schedule of a model. */
+#include "structure_encode.h"
+
+lathe_status lathe__pyramid_sample(lathe_mask *out, const lathe_mask *whole, const int32_t stride[3]) {
+    int32_t size[3];
+    lathe__pyramid_size(size, whole->size, stride);
+    lathe_status status = lathe__mask_new(out, size, whole->origin);
+    if (status) return status;
+    for (int32_t w = 0; w < size[2]; w++) {
+        const uint64_t *from = lathe__mask_slice(whole, w * stride[2]);
+        uint64_t *row = lathe__mask_slice(out, w);
+        for (int32_t v = 0; v < size[1] && v * stride[1] < whole->size[1]; v++, row += out->row_words)
+            for (int32_t u = 0; u < size[0] && u * stride[0] < whole->size[0]; u++)
+                row[u >> 6] |= (uint64_t)lathe__slice_pixel(from, whole->row_words, u * stride[0], v * stride[1]) << (u & 63);
+    }
+    return LATHE_OK;
+}
+
+static lathe_status encode_planes(lathe_structure_state *state, lathe_range_encoder *e, const lathe_mask *planes, int axis) {
+    lathe_plane_range range = lathe__pyramid_planes(planes, axis);
+    lathe_status status = lathe__occupancy_frame(state->occupancy, planes->size[0], planes->size[1]);
+    for (int32_t c = range.first; !status && c < range.end; c += range.step) {
+        lathe_known known = lathe__pyramid_known(planes, c, axis);
+        status = lathe__occupancy_encode(state->occupancy, e, lathe__mask_slice(planes, c), &known);
+    }
+    return status;
+}
+
+lathe_status lathe__pass_encode(lathe_range_encoder *e, lathe_structure_state *state, lathe_models *models, uint32_t level, uint32_t pass) {
+    int32_t stride[3];
+    lathe_mask lattice, planes;
+    int axis = level ? lathe__pyramid_axis(state->pyramid, level, pass) : -1;
+    lathe__pyramid_strides(stride, state->pyramid, level, pass + 1);
+    lathe_status status = level ? LATHE_OK : lathe__state_start_occupancy(state, models);
+    if (!status) status = lathe__pyramid_sample(&lattice, &state->mask, stride);
+    if (status) return status;
+    if (axis == 0 || axis == 1) {
+        status = lathe__pyramid_turn(&planes, &lattice, axis);
+        lathe__mask_free(&lattice);
+        if (status) return status;
+        lattice = planes;
+    }
+    status = encode_planes(state, e, &lattice, axis);
+    lathe__mask_free(&lattice);
+    return status;
+}
+
+/* ---- schedule ---- */
+
+/* Octaves: so many that the first lattice has about as many samples along an axis as there are voxels between two of them. */
+static uint32_t octaves(const double voxels[3]) {
+    double product = voxels[0] * voxels[1] * voxels[2];
+    uint32_t n = 1;
+    while (n < 10 && product > (double)((uint64_t)1 << 6 * (n + 1))) n++;
+    return n;
+}
+
+void lathe__pyramid_plan(lathe_header *header, const double spacing[3], const int32_t most[3]) {
+    static const int ties[3] = {1, 0, 2};   /* halved last, so merged first: v, u, w */
+    double finest = spacing[0], voxels[3], distance[3];
+    for (int k = 1; k < 3; k++) if (spacing[k] < finest) finest = spacing[k];
+    for (int k = 0; k < 3; k++) {
+        voxels[k] = most[k] * spacing[k] / finest;
+        distance[k] = spacing[k];
+    }
+    int axes[3 * 10];
+    uint32_t n = octaves(voxels), count = 0;
+    for (; count < 3 * n; count++) {
+        int least = -1;
+        for (int i = 0; i < 3; i++) {
+            bool more = distance[ties[i]] < most[ties[i]] * spacing[ties[i]];   /* else one sample is left */
+            if (more && (least < 0 || distance[ties[i]] < distance[least] * 0.999)) least = ties[i];
+        }
+        if (least < 0) break;
+        distance[least] *= 2;
+        axes[count] = least;
+    }
+    if (!count) axes[count++] = 2;   /* a single voxel */
+    /* From the last level back: one pass, two, then three each. */
+    header->parameter_count = 2;
+    for (uint32_t left = count; left;) {
+        uint32_t done = count - left, passes = done == 0 ? 1 : done == 1 ? 2 : 3, code = 0;
+        for (uint32_t i = 0; i < passes; i++) code = code << 2 | (uint32_t)(axes[done + i] + 1);
+        header->parameters[header->parameter_count++] = code;
+        left -= passes;
+    }
+    for (uint32_t i = 2, k = header->parameter_count - 1; i < k; i++, k--) {
+        uint32_t swap = header->parameters[i];
+        header->parameters[i] = header->parameters[k];
+        header->parameters[k] = swap;
+    }
+}
