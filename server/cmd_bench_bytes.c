@@ -77,7 +77,7 @@ typedef struct bytes_report {
     double voxel;                  /* mm: the smallest spacing */
     uint32_t level_count;
     level_row levels[LATHE_MAX_LEVELS];
-    json_t *packets;               /* NULL, or [[level, structure, payload, bytes of the stream up to its end], ...] */
+    json_t *passes;                /* NULL, or [[level, pass, payload, bytes of the stream up to its end], ...] */
 } bytes_report;
 
 static double smallest_spacing(const double affine[3][4]) {
@@ -89,10 +89,16 @@ static double smallest_spacing(const double affine[3][4]) {
     return least;
 }
 
-static void list_packet(bytes_report *report, uint32_t level, uint32_t structure, uint32_t payload, uint64_t end) {
-    if (!report->packets) return;
-    json_array_append_new(report->packets, json_pack("[I, I, I, I]", (json_int_t)level, (json_int_t)structure, (json_int_t)payload,
-                                                     (json_int_t)end));
+static void list_pass(bytes_report *report, uint32_t level, uint32_t pass, uint64_t payload, uint64_t end) {
+    if (!report->passes) return;
+    json_array_append_new(report->passes, json_pack("[I, I, I, I]", (json_int_t)level, (json_int_t)pass, (json_int_t)payload, (json_int_t)end));
+}
+
+/* Where a client may stop with all structures alike: behind each pass of a pyramid's level, else behind the level. */
+static uint32_t packets_of_pass(const lathe_header *header, uint32_t level) {
+    uint32_t flags = lathe__header_flags(header);
+    if (flags & LATHE_FLAG_PYRAMID && flags & LATHE_FLAG_SHARED) return 1;
+    return lathe__header_present(header, level);
 }
 
 static lathe_status walk_packets(bytes_report *report, lathe_reader *reader, const lathe_header *header, const uint8_t *start) {
@@ -100,15 +106,17 @@ static lathe_status walk_packets(bytes_report *report, lathe_reader *reader, con
         lathe_level_head head;
         lathe_status status = lathe__level_parse(&head, reader, header);
         if (status) return status;
-        uint32_t packet = 0;
-        for (uint32_t i = 0; !status && i < header->structure_count; i++) {
-            if (header->structures[i].level_count <= level) continue;
-            uint32_t size = head.sizes[packet++];
-            if (!lathe__packet_parse(reader, size)) status = reader->status;
-            report->levels[level].payload += size;
-            list_packet(report, level, i, size, (uint64_t)(reader->at - start));
+        uint32_t each = packets_of_pass(header, level);
+        uint64_t payload = 0;
+        for (uint32_t packet = 0; !status && packet < head.count; packet++) {
+            if (!lathe__packet_parse(reader, head.sizes[packet])) status = reader->status;
+            report->levels[level].payload += head.sizes[packet];
+            payload += head.sizes[packet];
+            if ((packet + 1) % each) continue;
+            list_pass(report, level, packet / each, payload, (uint64_t)(reader->at - start));
+            payload = 0;
         }
-        report->levels[level].packets = packet;
+        report->levels[level].packets = head.count;
         lathe__level_head_free(&head);
         if (status) return status;
     }
@@ -135,23 +143,74 @@ static int count_sink(void *context, const void *bytes, size_t size) {
     return 0;
 }
 
-static bool dump_mesh(const lathe_world_mesh *mesh, const char *folder, uint32_t level) {
+/* ---- the mesh behind each pass, as `--meshes FOLDER` wants them ---- */
+
+typedef struct whole_mesh { float (*positions)[3]; uint32_t (*indices)[3]; uint32_t counts[2]; } whole_mesh;
+
+/* All structures as they stand. */
+static lathe_status gather(whole_mesh *out, lathe_decoder *decoder) {
+    for (uint32_t s = 0; s < lathe_decoder_structures(decoder); s++) {
+        const lathe_mesh *mesh = lathe_decoder_mesh(decoder, s);
+        if (!mesh) return LATHE_ERR_FORMAT;
+        float (*positions)[3] = realloc(out->positions, ((size_t)out->counts[0] + mesh->vertex_count + 1) * sizeof *positions);
+        if (positions) out->positions = positions;
+        uint32_t (*indices)[3] = realloc(out->indices, ((size_t)out->counts[1] + mesh->triangle_count + 1) * sizeof *indices);
+        if (indices) out->indices = indices;
+        if (!positions || !indices) return LATHE_ERR_MEMORY;
+        const lathe_transform *transform = lathe_decoder_transform(decoder, s);
+        lathe_mesh_positions(mesh, transform, &positions[out->counts[0]][0]);
+        lathe_mesh_indices(mesh, transform, &indices[out->counts[1]][0]);
+        for (uint32_t i = 0; i < mesh->triangle_count; i++)
+            for (int k = 0; k < 3; k++) indices[out->counts[1] + i][k] += out->counts[0];
+        out->counts[0] += mesh->vertex_count;
+        out->counts[1] += mesh->triangle_count;
+    }
+    return LATHE_OK;
+}
+
+static bool dump_mesh(const whole_mesh *mesh, const char *folder, uint32_t level, uint32_t pass) {
     char path[4096];
-    if ((size_t)snprintf(path, sizeof path, "%s/level%u.mesh", folder, level) >= sizeof path) return false;
+    if ((size_t)snprintf(path, sizeof path, "%s/level%u.pass%u.mesh", folder, level, pass) >= sizeof path) return false;
     FILE *file = fopen(path, "wb");
     if (!file) return false;
-    uint32_t counts[2] = {mesh->vertex_count, mesh->triangle_count};
-    bool good = fwrite(counts, sizeof counts, 1, file) == 1 &&
-                fwrite(mesh->positions, 12, mesh->vertex_count, file) == mesh->vertex_count &&
-                fwrite(mesh->indices, 12, mesh->triangle_count, file) == mesh->triangle_count;
-    for (uint32_t i = 0; good && i < mesh->structure_count; i++) {
-        uint32_t part[2] = {mesh->parts[i].vertex_count, mesh->parts[i].triangle_count};
-        good = fwrite(part, sizeof part, 1, file) == 1;
-    }
+    bool good = fwrite(mesh->counts, sizeof mesh->counts, 1, file) == 1 &&
+                fwrite(mesh->positions, 12, mesh->counts[0], file) == mesh->counts[0] &&
+                fwrite(mesh->indices, 12, mesh->counts[1], file) == mesh->counts[1];
     return fclose(file) == 0 && good;
 }
 
-static lathe_status measure_level(bytes_report *report, const lathe_model *model, uint32_t level, const char *folder, lathe_error *err) {
+static lathe_status dump_passes(const lathe_model *model, const char *folder, lathe_error *err) {
+    size_t size;
+    const uint8_t *stream = lathe__whole_stream(model, &size);
+    lathe_decoder *decoder;
+    lathe_step step;
+    uint32_t level = UINT32_MAX, pass = 0;
+    lathe_status status = lathe_decoder_open(&decoder);
+    if (status) return lathe_fail(err, status, "out of memory");
+    lathe_decoder_build_meshes(decoder, false);
+    lathe_decoder_every_pass(decoder, true);
+    status = lathe_decoder_feed(decoder, stream, size);
+    while (!status && !(status = lathe_decoder_step(decoder, &step))) {
+        bool last = true;
+        for (uint32_t s = step.structure + 1; s < lathe_decoder_structures(decoder); s++)
+            if (lathe_model_describe(model)->structures[s].level_count > step.level) last = false;
+        if (!last) continue;
+        pass = step.level == level ? pass + 1 : 0;
+        level = step.level;
+        whole_mesh mesh = {NULL, NULL, {0, 0}};
+        status = gather(&mesh, decoder);
+        if (!status && !dump_mesh(&mesh, folder, level, pass)) {
+            lathe_fail(err, LATHE_ERR_IO, "%s/level%u.pass%u.mesh: %s", folder, level, pass, strerror(errno));
+            status = LATHE_ERR_IO;
+        }
+        free(mesh.positions);
+        free(mesh.indices);
+    }
+    lathe_decoder_close(&decoder);
+    return status == LATHE_MORE ? LATHE_OK : status;
+}
+
+static lathe_status measure_level(bytes_report *report, const lathe_model *model, uint32_t level, lathe_error *err) {
     level_row *row = &report->levels[level];
     lathe_world_mesh mesh;
     memset(&mesh, 0, sizeof mesh);
@@ -160,8 +219,6 @@ static lathe_status measure_level(bytes_report *report, const lathe_model *model
     lathe_status status = lathe_model_mesh(&mesh, model, -1, level, err);
     if (status) return status;
     status = lathe_write_drc(&mesh, 0, count_sink, &row->draco);
-    if (!status && folder && !dump_mesh(&mesh, folder, level))
-        status = lathe_fail(err, LATHE_ERR_IO, "%s/level%u.mesh: %s", folder, level, strerror(errno));
     lathe_world_mesh_free(&mesh);
     /* A model without Draco deltas still has all the other figures. */
     if (!status && lathe_write_draco_delta(model, -1, level, count_sink, &row->draco_delta, err)) {
@@ -175,8 +232,8 @@ static lathe_status measure(bytes_report *report, const lathe_model *model, cons
     report->info = lathe_model_describe(model);
     report->level_count = report->info->level_count;
     lathe_status status = count_packets(report, model, err);
-    for (uint32_t level = 0; !status && level < report->level_count; level++) status = measure_level(report, model, level, folder, err);
-    return status;
+    for (uint32_t level = 0; !status && level < report->level_count; level++) status = measure_level(report, model, level, err);
+    return status || !folder ? status : dump_passes(model, folder, err);
 }
 
 /* ---- printing ---- */
@@ -239,7 +296,7 @@ static int print_json(const bytes_report *report, const stage_clock *clock, cons
     for (int i = 0; i < clock->count; i++) json_object_set_new(stages, clock->stages[i].name, json_real(clock->stages[i].seconds));
     json_t *decode = json_pack("{s:I, s:f, s:f}", "triangles", (json_int_t)speed->triangles, "seconds", speed->seconds, "seconds_with_normals",
                                speed->with_normals);
-    json_t *all = json_pack("{s:f, s:o, s:O, s:o, s:o}", "voxel_mm", report->voxel, "levels", levels, "packets", report->packets, "decode",
+    json_t *all = json_pack("{s:f, s:o, s:O, s:o, s:o}", "voxel_mm", report->voxel, "levels", levels, "passes", report->passes, "decode",
                             decode, "bake_cpu_seconds", stages);
     int failed = all ? json_dumpf(all, stdout, JSON_COMPACT | JSON_REAL_PRECISION(9)) : -1;
     if (!failed) putchar('\n');
@@ -255,7 +312,7 @@ static int report_archive(const char *path, const stage_clock *clock, bool json,
     bytes_report report;
     lathe__decode_speed speed;
     memset(&report, 0, sizeof report);
-    report.packets = json ? json_array() : NULL;
+    report.passes = json ? json_array() : NULL;
     lathe_status status = lathe_model_open(&model, path, &err);
     if (!status) status = measure(&report, model, folder, &err);
     if (!status) status = lathe__measure_decoding(&speed, model, repeats, &err);
@@ -263,7 +320,7 @@ static int report_archive(const char *path, const stage_clock *clock, bool json,
     if (status) result = lathe__status_error("bench", path, status, &err);
     else if (json) result = print_json(&report, clock, &speed);
     else print_text(&report, clock, &speed);
-    json_decref(report.packets);
+    json_decref(report.passes);
     lathe_model_close(&model);
     return result;
 }

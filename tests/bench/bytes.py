@@ -5,7 +5,7 @@
            [--volume FILE [--iso V]] [--peers JSON] [--quick] [--json FILE] [--markdown FILE] [--plots DIR] [--strict]
 
 Errors are two-sided RMS in voxels against a reference surface, the worse direction, measured by VTK. Bytes of Lathe are all that a
-client has fetched when it stands at the error: header, heads of level records, packets, checksums. It may stop after any packet.
+client has fetched when it stands at the error: header, heads of level records, packets, checksums. It may stop behind any pass.
 Peers: Lindstrom-Turk (CGAL) and quadric (VTK) decimation, each mesh under Draco and under meshoptimizer + zstd at every sensible
 quantisation; the fewest bytes at no greater error count. Their levels summed: separate meshes of falling error, one after the other.
 The voxel mask under a mixed 3D context model. `make bench-bytes` builds the tools and runs this.
@@ -19,7 +19,6 @@ import bench, bytes_peers as peers, bytes_plot as plot, bytes_volumes as volumes
 
 TARGETS = (1.0, 0.5, 0.25)
 FINE = 0.25
-CURVE_PARTS = 4              # places within a level record where the curve is measured, when it has more packets than one
 BITS_FINEST = 0.1
 MOST_WASM = 12 * 1024
 
@@ -41,77 +40,44 @@ class Effort:
 
 
 class Stream:
-    """What `lathe bench bytes` tells, and the meshes that a client has after each packet"""
+    """What `lathe bench bytes` tells, and the meshes that a client has after each pass"""
     def __init__(self, volume, lathe, folder, repeats):
         self.archive = os.path.join(folder, "stream.lathe")
         command = [lathe, "bench", "bytes", volume.path, *volume.options, "--json", "--meshes", folder, "-o", self.archive, "--repeat", str(repeats)]
         self.report = json.loads(bench.output(command))
-        self.levels, self.packets = self.report["levels"], self.report["packets"]
-        self.folder, self.meshes = folder, {}
-        self.ends = [i for i, p in enumerate(self.packets) if i + 1 == len(self.packets) or self.packets[i + 1][0] != p[0]]
+        self.levels, self.passes, self.folder = self.report["levels"], self.report["passes"], folder
+        self.ends = [i for i, p in enumerate(self.passes) if i + 1 == len(self.passes) or self.passes[i + 1][0] != p[0]]
 
-    def level(self, n):
-        """(points, triangles) of each structure, and [first, end) of its vertices and triangles"""
-        if n not in self.meshes:
-            points, triangles, parts = distance.read_mesh(os.path.join(self.folder, f"level{n}.mesh"))
-            ends = np.cumsum(parts.reshape(-1, 2).astype(int), axis=0)
-            self.meshes[n] = points, triangles, np.vstack([[0, 0], ends])
-        return self.meshes[n]
+    def mesh(self, at):
+        level, number = self.passes[at][:2]
+        return distance.read_mesh(os.path.join(self.folder, f"level{level}.pass{number}.mesh"))[:2]
 
-    def part(self, n, structure):
-        points, triangles, ends = self.level(n)
-        (v0, t0), (v1, t1) = ends[structure], ends[structure + 1]
-        return points[v0:v1], triangles[t0:t1].astype(np.int64) - v0
-
-    def mesh(self, packet):
-        """What is there after a packet: structures whose packet of the level has come stand at it, the others one below"""
-        level, structure = self.packets[packet][:2]
-        if packet in self.ends: return self.level(level)[:2]
-        count = len(self.level(level)[2]) - 1
-        shown = [(level if s <= structure else level - 1, s) for s in range(count)]
-        parts = [self.part(n, s) for n, s in shown if n >= 0]
-        starts = np.cumsum([0] + [len(p) for p, _ in parts])
-        return np.concatenate([p for p, _ in parts]), np.concatenate([t + at for (_, t), at in zip(parts, starts)])
-
-    def bytes(self, packet): return self.packets[packet][3]
-    def payload(self, packet): return sum(p[2] for p in self.packets[:packet + 1])
+    def bytes(self, at): return self.passes[at][3]
+    def payload(self, at): return sum(p[2] for p in self.passes[:at + 1])
 
 
 class Curve:
-    """A stream's error after its packets, measured when it is asked for"""
+    """A stream's error after each of its passes"""
     def __init__(self, stream, reference, samples):
         self.stream, self.reference, self.samples, self.errors = stream, reference, samples, {}
 
-    def error(self, packet):
-        if packet not in self.errors: self.errors[packet] = self.reference.error(*self.stream.mesh(packet), self.samples)
-        return self.errors[packet]
+    def error(self, at): return self.errors[at]
+
+    def look(self, at): return self.reference.error(*self.stream.mesh(at), self.samples)
 
     def measure(self, processes):
-        """The ends of all levels, and some places between"""
-        places, first = set(self.stream.ends), 0
-        for end in self.stream.ends:
-            places |= {first + (end - first) * i // CURVE_PARTS for i in range(1, CURVE_PARTS)} if end > first else set()
-            first = end + 1
         self.reference.sample(self.samples)
         peers.state["curve"] = self
-        with get_context("fork").Pool(processes) as pool: self.errors.update(pool.map(measure_place, sorted(places), 1))
+        with get_context("fork").Pool(processes) as pool: self.errors.update(pool.map(measure_place, range(len(self.stream.passes)), 1))
 
     def reach(self, target):
-        """The first packet found after which the RMS is at most target; its own error is what counts. None: never"""
-        known = sorted(self.errors)
-        good = next((p for p in known if self.errors[p]["rms"] <= target), None)
-        if good is None: return None
-        bad = max((p for p in known if p < good), default=-1)
-        while good - bad > 1:
-            middle = (good + bad) // 2
-            if self.error(middle)["rms"] <= target: good = middle
-            else: bad = middle
-        return good
+        """The first pass behind which the RMS is at most target, or None"""
+        return next((p for p in sorted(self.errors) if self.errors[p]["rms"] <= target), None)
 
     def points(self): return [(self.errors[p]["rms"], self.stream.bytes(p)) for p in sorted(self.errors)]
 
 
-def measure_place(packet): return packet, peers.state["curve"].error(packet)
+def measure_place(at): return at, peers.state["curve"].look(at)
 
 
 # ---- one volume -----------------------------------------------------------------------------------------------------------
@@ -144,9 +110,9 @@ def measure(volume, arguments, effort, folder, known):
               "levels": stream.levels, "decode": stream.report["decode"], "bake_cpu_seconds": stream.report["bake_cpu_seconds"]}
     for level, end in zip(result["levels"], stream.ends):
         level.update(stream_bytes=stream.bytes(end), vtk=curve.error(end))
-    result["stream"] = [{"packet": p, "level": stream.packets[p][0], "bytes": stream.bytes(p), "payload": stream.payload(p), **e}
+    result["stream"] = [{"pass": p, "level": stream.passes[p][0], "bytes": stream.bytes(p), "payload": stream.payload(p), **e}
                         for p, e in sorted(curve.errors.items())]
-    result["reached"] = {key(t): next(s for s in result["stream"] if s["packet"] == p) if p is not None else None for t, p in reached.items()}
+    result["reached"] = {key(t): next(s for s in result["stream"] if s["pass"] == p) if p is not None else None for t, p in reached.items()}
     result["peers"] = sorted(rows, key=lambda r: r["bytes"])
     result["best_peer"] = {key(t): peers.smallest(rows, t) for t in TARGETS}
     result["mask"] = known["mask"] if known else peers.mask(volume, reference, arguments.tools, folder, effort.samples)
@@ -331,7 +297,7 @@ def introduction(effort, reused):
     return [f"Measured by `make bench-bytes` on {bench.machine()}.", "",
             f"Two-sided errors in voxels, the worse direction, by VTK: {effort.samples:,} points on each surface for Lathe and the mask, "
             f"{effort.peer_samples:,} for each of the peers. Lathe's bytes are all that has been fetched, headers and checksums included; a "
-            "client may stop after any packet. A peer's bytes are the smallest single file at no greater error. All labels of the atlas are one surface in both "
+            "client may stop behind any pass of a level. A peer's bytes are the smallest single file at no greater error. All labels of the atlas are one surface in both "
             "directions, for Lathe and for the peers." + note]
 
 
