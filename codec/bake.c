@@ -224,7 +224,7 @@ static void schedule(bake *b) {
         voxels = n;
         most[0] = size[0] - 2, most[1] = size[1] - 2, most[2] = size[2];
     }
-    lathe__pyramid_plan(&b->header, spacing, most);
+    lathe__pyramid_plan(&b->header, spacing, most, b->options->levels);
 }
 
 static lathe_status plan_pyramid(bake *b) {
@@ -247,13 +247,13 @@ static lathe_status plan_pyramid(bake *b) {
 
 static lathe_status plan(bake *b) {
     lathe_status status = LATHE_OK;
-    bool keep = b->options->keep_topology, grey = b->boundary == LATHE_BOUNDARY_ISO && b->count == 1 && !b->options->exact;
+    bool keep = b->options->keep_topology, grey = b->boundary == LATHE_BOUNDARY_ISO && b->count == 1 && !b->options->exact && !b->options->levels;
     for (size_t i = 0; !status && i < b->count; i++) {
         status = extract_structure(b, i);
-        if (!status && (keep || grey)) status = plan_slices(b, i);
+        if (!status && (keep || grey || b->options->slices)) status = plan_slices(b, i);
         if (!status) status = tell(b, "planning", 0.2 * (double)(i + 1) / (double)b->count);
     }
-    return status || keep || b->states[0].radii ? status : plan_pyramid(b);
+    return status || keep || b->options->slices || b->states[0].radii ? status : plan_pyramid(b);
 }
 
 static lathe_status encode_structure(bake *b, size_t index, uint32_t level) {

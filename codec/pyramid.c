@@ -12,7 +12,7 @@ uint32_t lathe__pyramid_passes(const lathe_pyramid *pyramid, uint32_t level) {
 
 lathe_status lathe__pyramid_read(lathe_pyramid *out, const lathe_header *header) {
     *out = (lathe_pyramid){.level_count = header->parameter_count - 1, .start = {1, 1, 1}};
-    if (header->parameter_count < 3 || out->level_count > LATHE_MAX_LEVELS) return LATHE_ERR_FORMAT;
+    if (header->parameter_count < 2 || out->level_count > LATHE_MAX_LEVELS) return LATHE_ERR_FORMAT;
     for (uint32_t i = 0; i < header->structure_count; i++)
         if (header->structures[i].level_count != out->level_count) return LATHE_ERR_FORMAT;
     for (uint32_t level = 1; level < out->level_count; level++) {

@@ -55,7 +55,7 @@ static uint32_t octaves(const double voxels[3]) {
     return n;
 }
 
-void lathe__pyramid_plan(lathe_header *header, const double spacing[3], const int32_t most[3]) {
+void lathe__pyramid_plan(lathe_header *header, const double spacing[3], const int32_t most[3], uint32_t levels) {
     static const int ties[3] = {1, 0, 2};   /* halved last, so merged first: v, u, w */
     double finest = spacing[0], voxels[3], distance[3];
     for (int k = 1; k < 3; k++) if (spacing[k] < finest) finest = spacing[k];
@@ -64,8 +64,10 @@ void lathe__pyramid_plan(lathe_header *header, const double spacing[3], const in
         distance[k] = spacing[k];
     }
     int axes[3 * 10];
-    uint32_t n = octaves(voxels), count = 0;
-    for (; count < 3 * n; count++) {
+    /* From the last level back: one pass, two, then three each. */
+    uint32_t wanted = 3 * octaves(voxels), count = 0;
+    if (levels) wanted = levels < 3 ? levels - 1 : levels < LATHE_MAX_LEVELS && 3 * (levels - 2) < wanted ? 3 * (levels - 2) : wanted;
+    for (; count < wanted; count++) {
         int least = -1;
         for (int i = 0; i < 3; i++) {
             bool more = distance[ties[i]] < most[ties[i]] * spacing[ties[i]];   /* else one sample is left */
@@ -75,8 +77,6 @@ void lathe__pyramid_plan(lathe_header *header, const double spacing[3], const in
         distance[least] *= 2;
         axes[count] = least;
     }
-    if (!count) axes[count++] = 2;   /* a single voxel */
-    /* From the last level back: one pass, two, then three each. */
     header->parameter_count = 2;
     for (uint32_t left = count; left;) {
         uint32_t done = count - left, passes = done == 0 ? 1 : done == 1 ? 2 : 3, code = 0;

@@ -63,7 +63,7 @@ bool lathe__interrupted(void);
 /* ---- shared by bake and serve ---- */
 typedef struct lathe_bake_arguments {
     const char *input, *output, *name;
-    const char *iso, *label, *labels, *axis, *boundary, *topology, *spacing;
+    const char *iso, *label, *labels, *axis, *boundary, *topology, *spacing, *levels;
     bool errors, draco, quiet, exact, independent;
     int (*progress)(void *context, const char *stage, double fraction);   /* NULL: a bar on a terminal */
     void *progress_context;

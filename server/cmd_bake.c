@@ -111,7 +111,7 @@ static bool label_list_valid(const char *list) {
 }
 
 /* What --axis, --boundary and --topology say; axis -1: auto. */
-typedef struct bake_settings { int axis, boundary; double iso; bool iso_given, labels, keep; } bake_settings;
+typedef struct bake_settings { int axis, boundary; double iso; bool iso_given, labels, keep; uint32_t levels; } bake_settings;
 
 static int parse_settings(bake_settings *out, const lathe_command *command, const lathe_bake_arguments *a) {
     static const char *const axes[] = {"x", "y", "z"};
@@ -134,9 +134,14 @@ static int parse_settings(bake_settings *out, const lathe_command *command, cons
         else if (strcmp(a->boundary, "iso") == 0) s.boundary = LATHE_BOUNDARY_ISO;
         else return lathe__usage_error(command, "--boundary %s: it is one of edge, iso", a->boundary);
     }
+    int64_t levels = 0;
+    if (a->levels && !lathe__option_integer(&levels, a->levels, 1, LATHE_MAX_LEVELS))
+        return lathe__usage_error(command, "--levels %s: 1 to %d", a->levels, LATHE_MAX_LEVELS);
+    s.levels = (uint32_t)levels;
     s.keep = a->topology && strcmp(a->topology, "keep") == 0;
     if (a->topology && !s.keep && strcmp(a->topology, "own") != 0)
         return lathe__usage_error(command, "--topology %s: it is one of own, keep", a->topology);
+    if (s.keep && s.levels) return lathe__usage_error(command, "--levels: not with --topology keep");
     *out = s;
     return LATHE_PARSED;
 }
@@ -155,6 +160,7 @@ static int bake_volume(const lathe_volume *volume, const bake_settings *settings
     options.keep_topology = settings->keep;
     options.exact = a->exact;
     options.independent = a->independent;
+    options.levels = settings->levels;
     options.structures = choice->structures;
     options.structure_count = choice->count;
     options.name = a->name ? a->name : stem;
@@ -229,6 +235,7 @@ static int run(int argc, char **argv) {
         LATHE_OPTION_TEXT("label", 0, &a.label),       LATHE_OPTION_TEXT("labels", 0, &a.labels),
         LATHE_OPTION_TEXT("axis", 0, &a.axis),         LATHE_OPTION_TEXT("boundary", 0, &a.boundary),
         LATHE_OPTION_TEXT("topology", 0, &a.topology), LATHE_OPTION_TEXT("spacing", 0, &a.spacing),
+        LATHE_OPTION_TEXT("levels", 0, &a.levels),
         LATHE_OPTION_TEXT("name", 0, &a.name),         LATHE_OPTION_FLAG("no-errors", &a.errors, false),
         LATHE_OPTION_FLAG("draco", &a.draco, true),    LATHE_OPTION_FLAG("no-draco", &a.draco, false),
         LATHE_OPTION_FLAG("exact", &a.exact, true),    LATHE_OPTION_FLAG("independent", &a.independent, true),
@@ -260,11 +267,12 @@ const lathe_command lathe__command_bake = {
     "  --boundary B       edge (middle of pixel borders; default for labels) or iso (between grey values; default else)\n"
     "  --topology T       own: each level has that of its slices, small components wait (default); keep: every level has\n"
     "                     the components, cavities and tunnels of the last, which takes more bytes at the start\n"
+    "  --levels N         at most N levels, never a radius map; default: by the size, 3 to 12\n"
     "  --spacing MM       of the grid that a contour set (.json with \"sections\") is put on; default: its sections' spacing\n"
     "  --name NAME        of the model; default: INPUT's name\n"
     "  --no-errors        do not measure the levels' errors (faster)\n"
     "  --no-draco         do not measure the levels' size in Draco (faster)\n"
-    "  --exact            every slice as it is; else a star-shaped structure may become a radius map, if that is within\n"
+    "  --exact            every voxel as it is; else a star-shaped structure may become a radius map, if that is within\n"
     "                     0.215 voxel RMS and 1 voxel anywhere for 3/4 of the bytes\n"
     "  --independent      each structure can be decoded alone (range requests), for about an eighth more bytes\n"
     "  --quiet            no progress bar, no summary\n"

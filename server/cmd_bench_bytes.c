@@ -356,7 +356,7 @@ int lathe__bench_bytes(int argc, char **argv) {
         LATHE_OPTION_TEXT("axis", 0, &a.axis),         LATHE_OPTION_TEXT("boundary", 0, &a.boundary),
         LATHE_OPTION_TEXT("topology", 0, &a.topology), LATHE_OPTION_TEXT("spacing", 0, &a.spacing),
         LATHE_OPTION_FLAG("no-errors", &a.errors, false), LATHE_OPTION_FLAG("exact", &a.exact, true),
-        LATHE_OPTION_FLAG("independent", &a.independent, true), LATHE_OPTION_TEXT("meshes", 0, &folder),
+        LATHE_OPTION_FLAG("independent", &a.independent, true), LATHE_OPTION_TEXT("levels", 0, &a.levels), LATHE_OPTION_TEXT("meshes", 0, &folder),
         LATHE_OPTION_TEXT("repeat", 'r', &repeat),     LATHE_OPTION_FLAG("json", &json, true),
     };
     int count, status = lathe__parse_options(command, argc, argv, options, sizeof options / sizeof *options, &count);

@@ -45,6 +45,8 @@ lathe_status lathe__rebake(lathe_rebaked *out, const lathe_model_info *info, con
     options.keep_topology = info->keep_topology;
     options.flat_caps = !info->caps;
     options.exact = info->exact;
+    options.slices = !info->pyramid;
+    options.levels = info->pyramid ? info->level_count : 0;
     options.independent = info->independent;
     options.measure = options.draco = false;
     if (isnan(info->iso)) {
