@@ -96,6 +96,13 @@ def wasm_ratio(archive, lathe, wasm, seconds):
     return min(browser) / min(native)
 
 
+def single_rate(volume, lathe, folder):
+    """Bytes of the last level alone, coded at once by the same coder"""
+    command = [lathe, "bake", volume.path, *volume.options, "--levels", "1", "--no-errors", "--no-draco", "--json", "--quiet", "-o",
+               os.path.join(folder, "single.lathe")]
+    return sum(level["polar_bytes"] for level in json.loads(bench.output(command))["levels"])
+
+
 def measure(volume, arguments, effort, folder, known):
     """known: an earlier result, whose peers and mask are taken; or None"""
     started = time.time()
@@ -116,6 +123,7 @@ def measure(volume, arguments, effort, folder, known):
     result["peers"] = sorted(rows, key=lambda r: r["bytes"])
     result["best_peer"] = {key(t): peers.smallest(rows, t) for t in TARGETS}
     result["mask"] = known["mask"] if known else peers.mask(volume, reference, arguments.tools, folder, effort.samples)
+    if volume.kind == "folded": result["single_rate"] = single_rate(volume, arguments.lathe, folder)
     result["wasm_ratio"] = wasm_ratio(stream.archive, arguments.lathe, arguments.wasm, result["decode"]["seconds"])
     result["curves"] = curves(curve.points(), rows, result["mask"])
     result["seconds"] = round(time.time() - started, 1)
@@ -205,6 +213,11 @@ def against_mask(results, name):
         yield f"{name}, the same, one model for all masks", "", ratio(total, mask["together"]), None
 
 
+def overhead(results):
+    found = {name: 100 * (r["levels"][-1]["stream_bytes"] / r["single_rate"] - 1) for name, r in results.items() if r.get("single_rate")}
+    if found: yield "all levels against the last one coded at once, more bytes, %", "<= 3", listed(found, "+.1f"), max(found.values()) <= 3
+
+
 def largest_errors(results):
     found = {n: r["reached"][key(FINE)]["max"] if r["reached"][key(FINE)] else math.inf for n, r in results.items()}
     yield f"largest error at {FINE:g} RMS, voxels", "<= 1.5", listed(found), max(found.values()) <= 1.5
@@ -269,6 +282,7 @@ def figures(results, wasm):
     yield from against_peer(results, "aal", (FINE,), 0.6)
     for name in ("torso", "xcolumn"): yield from against_peer(results, name, (FINE,), 0.5)
     for name in ("ch2bet", "aal"): yield from against_mask(results, name)
+    yield from overhead(results)
     yield from largest_errors(results)
     yield from falling_bits(results)
     yield from star_bytes(results, "head", 900)
