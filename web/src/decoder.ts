@@ -1,9 +1,10 @@
 /** The wasm decoder: bytes in, meshes out. */
 
-/** What one packet brought. */
+/** What a structure came to: a level, or a pass on the way to it. */
 export interface Step {
     structure: number;
     level: number;
+    passesLeft: number;
 }
 
 /** See web/wasm/README.md. */
@@ -12,6 +13,7 @@ interface Exports {
     report_words(): number;
     input(size: number): number;
     feed(size: number): number;
+    every_pass(): void;
     step(): number;
     mesh(structure: number): number;
     error_text(): number;
@@ -38,13 +40,14 @@ export class Decoder {
         if (!address) throw Error('out of memory');
         new Uint8Array(this.#wasm.memory.buffer).set(bytes, address);
         this.#check(this.#wasm.feed(bytes.length));
+        this.#wasm.every_pass();
     }
 
-    /** Decodes the next packet: the structure and its level, or undefined if more bytes are needed. */
+    /** Decodes the next pass of a structure; undefined if more bytes are needed. */
     step(): Step | undefined {
         if (this.#check(this.#wasm.step())) return;
-        const [structure, level] = this.#report();
-        return { structure, level };
+        const [structure, level, , , , , passesLeft] = this.#report();
+        return { structure, level, passesLeft };
     }
 
     mesh(structure: number) {

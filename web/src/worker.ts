@@ -2,17 +2,22 @@
 import { Decoder, type Step } from './decoder';
 import type { Reply, Request, Start } from './messages';
 
+/** How long nothing must come until the passes of an unfinished level are shown, ms. */
+const PATIENCE = 150;
+
 /** A failure that another try may get over. */
 class NetworkError extends Error {}
 
 export function runWorker() {
     const send = (reply: Reply, transfer: Transferable[] = []) => postMessage(reply, { transfer });
     let source: Start, module: WebAssembly.Module, decoder: Decoder;
-    const portions: Uint8Array[] = [], steps: Step[] = [];
+    const portions: Uint8Array[] = [], steps: Step[] = [], unshown = new Map<number, Step>();
     let received = 0;
     let tail = Promise.resolve();   // requests are served one after the other
 
-    function sendMesh(of: Decoder, { structure, level }: Step) {
+    /** Passes count as the level before them, whose error is the one that is known. */
+    function sendMesh(of: Decoder, { structure, level, passesLeft }: Step) {
+        if (passesLeft) level--;
         const mesh = { ...of.mesh(structure), structure, level };
         send({ mesh }, [mesh.buffer]);
     }
@@ -23,9 +28,18 @@ export function runWorker() {
         decoder.feed(portion);
         for (let step; (step = decoder.step()); ) {
             steps.push(step);
-            sendMesh(decoder, step);
+            if (step.passesLeft) unshown.set(step.structure, step);
+            else {
+                unshown.delete(step.structure);
+                sendMesh(decoder, step);
+            }
         }
         send({ bytes: received });
+    }
+
+    function showPasses() {
+        for (const step of unshown.values()) sendMesh(decoder, step);
+        unshown.clear();
     }
 
     /** A second try skips what the first one brought. */
@@ -40,9 +54,13 @@ export function runWorker() {
                 throw error instanceof NetworkError ? error : new NetworkError('The server cannot be reached.');
             }
             for (;;) {
-                const { value } = await reader.read().catch(() => {
-                    throw new NetworkError('The connection broke off.');
-                });
+                const waiting = setTimeout(showPasses, PATIENCE);
+                const { value } = await reader
+                    .read()
+                    .catch(() => {
+                        throw new NetworkError('The connection broke off.');
+                    })
+                    .finally(() => clearTimeout(waiting));
                 if (!value) break;
                 if (skip < value.length) take(value.slice(skip));
                 skip = Math.max(0, skip - value.length);
@@ -67,7 +85,7 @@ export function runWorker() {
         for (const step of steps) {
             if (step.level > level) break;
             again.step();
-            latest.set(step.structure, step);
+            if (!step.passesLeft) latest.set(step.structure, step);
         }
         for (const step of latest.values()) sendMesh(again, step);
     }

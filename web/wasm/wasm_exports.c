@@ -42,6 +42,9 @@ lathe_status EXPORT(feed)(uint32_t size) {
     return lathe_decoder_feed(decoder, input_bytes, size);
 }
 
+/* From now on steps stop behind every pass; before the first portion they do not. */
+void EXPORT(every_pass)(void) { if (decoder) lathe_decoder_every_pass(decoder, true); }
+
 lathe_status EXPORT(step)(void) { return decoder ? lathe_decoder_step(decoder, &report.step) : LATHE_MORE; }
 
 lathe_status EXPORT(mesh)(uint32_t structure) {
