@@ -1,6 +1,7 @@
 // The viewer in a real Chromium, served by the real program. LATHE_MODEL=FILE.lathe also shows that model (screenshots).
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
+import { createServer } from 'node:http';
 import { basename, join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
@@ -245,6 +246,29 @@ test('a stream cut short is taken up where it broke', async () => {
     await settle(page);
     assert.ok(+(await data(page)).level > +half.level);
     await page.close();
+});
+
+test('a slow stream shows the passes of a level before it is whole', async () => {
+    const body = Buffer.from(await (await fetch(server.url + '/models/shapes/stream?from=1')).arrayBuffer());
+    const { levels } = await (await fetch(server.url + '/models/shapes')).json();
+    // The last level but one has two passes: the first is there, of the second one byte is missing.
+    const before = levels.length - 3, there = levels.slice(1, -1).reduce((sum, level) => sum + level.polar_bytes, 0) - 1;
+    let resume;
+    const slow = createServer((request, response) => {
+        response.writeHead(200, { 'Content-Type': 'application/octet-stream' });
+        response.write(body.subarray(0, there));
+        resume = () => response.end(body.subarray(there));
+    });
+    await new Promise((listening) => slow.listen(0, '127.0.0.1', listening));
+    const page = await open('/m/shapes', { route: (route) => route.continue({ url: `http://127.0.0.1:${slow.address().port}/` }) });
+    await page.waitForFunction((least) => document.documentElement.dataset.triangles > least, levels[before].triangles, { timeout: 60000 });
+    assert.equal((await data(page)).level, '' + before);
+    resume();
+    await state(page, 'done');
+    await settle(page);
+    assert.equal((await data(page)).triangles, '' + levels.at(-1).triangles);
+    await page.close();
+    slow.close();
 });
 
 test('a browser without WebGL2 says so', async () => {
