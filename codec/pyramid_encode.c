@@ -1,18 +1,40 @@
 /* Passes of a pyramid from the whole mask, and the schedule of a model. */
+#include <string.h>
 #include "structure_encode.h"
+
+/* The even bits, together in the lower half. */
+static uint64_t squeeze_bits(uint64_t x) {
+    x &= UINT64_C(0x5555555555555555);
+    x = (x | x >> 1) & UINT64_C(0x3333333333333333);
+    x = (x | x >> 2) & UINT64_C(0x0f0f0f0f0f0f0f0f);
+    x = (x | x >> 4) & UINT64_C(0x00ff00ff00ff00ff);
+    x = (x | x >> 8) & UINT64_C(0x0000ffff0000ffff);
+    return (x | x >> 16) & UINT64_C(0xffffffff);
+}
+
+/* Every stride-th pixel of a row; row has room for the whole one. */
+static void sample_row(uint64_t *row, const uint64_t *from, int32_t words, int32_t stride) {
+    memcpy(row, from, (size_t)words * sizeof *row);
+    for (; stride > 1; stride /= 2) {
+        for (int32_t i = 0; i < words; i += 2)
+            row[i / 2] = squeeze_bits(row[i]) | (i + 1 < words ? squeeze_bits(row[i + 1]) << 32 : 0);
+        words = (words + 1) / 2;
+    }
+}
 
 lathe_status lathe__pyramid_sample(lathe_mask *out, const lathe_mask *whole, const int32_t stride[3]) {
     int32_t size[3];
+    uint64_t row[(LATHE_MAX_DIM + 2 + 63) / 64];
     lathe__pyramid_size(size, whole->size, stride);
     lathe_status status = lathe__mask_new(out, size, whole->origin);
     if (status) return status;
-    for (int32_t w = 0; w < size[2]; w++) {
-        const uint64_t *from = lathe__mask_slice(whole, w * stride[2]);
-        uint64_t *row = lathe__mask_slice(out, w);
-        for (int32_t v = 0; v < size[1] && v * stride[1] < whole->size[1]; v++, row += out->row_words)
-            for (int32_t u = 0; u < size[0] && u * stride[0] < whole->size[0]; u++)
-                row[u >> 6] |= (uint64_t)lathe__slice_pixel(from, whole->row_words, u * stride[0], v * stride[1]) << (u & 63);
-    }
+    size_t bytes = (size_t)(out->row_words < whole->row_words ? out->row_words : whole->row_words) * sizeof *row;
+    for (int32_t w = 0; w < size[2]; w++)
+        for (int32_t v = 0; v < size[1] && v * stride[1] < whole->size[1]; v++) {
+            const uint64_t *from = lathe__mask_slice(whole, w * stride[2]) + (size_t)(v * stride[1]) * (size_t)whole->row_words;
+            sample_row(row, from, whole->row_words, stride[0]);
+            memcpy(lathe__mask_slice(out, w) + (size_t)v * (size_t)out->row_words, row, bytes);
+        }
     return LATHE_OK;
 }
 
