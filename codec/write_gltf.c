@@ -4,6 +4,8 @@
  * asset faces +Z: x = -right, y = superior, z = anterior, a half turn about (0, 1, 1). Positions stay those of the
  * other formats.
  *
+ * Parts without triangles are left out, so with a model each mesh says in its extras which structure it is.
+ *
  * Binary chunk: all positions, all normals, all indices (relative to their part's first vertex). */
 #include "archive_write.h"
 #include "write_common.h"
@@ -73,6 +75,11 @@ static const char *part_name(const glb *g, uint32_t part) {
     return g->options && g->options->name ? g->options->name : "surface";
 }
 
+static void json_structure(glb *g, uint32_t part) {
+    if (lathe__part_info(g->mesh, g->options, g->origin[part]))
+        json_format(g, ",\"extras\":{\"structure\":%u}", g->mesh->parts[g->origin[part]].structure);
+}
+
 static double linear_from_srgb(uint8_t v) {
     double c = v / 255.0;
     return c <= 0.04045 ? c / 12.92 : pow((c + 0.055) / 1.055, 2.4);
@@ -98,6 +105,7 @@ static void json_meshes(glb *g) {
     for (uint32_t p = 0; p < g->part_count; p++) {
         json_text(g, p ? ",{\"name\":" : "{\"name\":");
         json_string(g, part_name(g, p));
+        json_structure(g, p);
         json_format(
             g, ",\"primitives\":[{\"attributes\":{\"POSITION\":%u,\"NORMAL\":%u},\"indices\":%u,\"material\":%u}]}",
             3 * p, 3 * p + 1, 3 * p + 2, p);

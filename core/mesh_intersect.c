@@ -1,6 +1,7 @@
-/* Self-intersections: a tree of boxes finds the pairs, exact predicates decide. */
+/* Self-intersections: a tree of boxes finds the pairs, but within large fans (mesh_fan.h); exact predicates decide. */
 #include "mesh_intersect.h"
 #include "box_tree.h"
+#include "mesh_fan.h"
 
 __extension__ typedef __int128 int128;
 typedef const int32_t *point; /* three lattice coordinates */
@@ -16,8 +17,9 @@ static int orient3d_exact(const int64_t a[3], const int64_t b[3], const int64_t 
     return sign128(a[0] * x + a[1] * y + a[2] * z);
 }
 
-/* The differences are exact doubles, so each of the six triple products errs by at most (1 + 2^-53)^5 - 1 of its size
- * (product, minor, product, two sums): 8 * 2^-53 of the sum of their sizes covers it, and the rounding of that sum too. */
+/* The differences are exact doubles, so each of the six triple products errs by at most (1 + 2^-53)^5 - 1 of its
+ * size (product, minor, product, two sums): 8 * 2^-53 of the sum of their sizes covers it, and the rounding of that
+ * sum too. */
 static int orient3d_filtered(const int64_t a[3], const int64_t b[3], const int64_t c[3]) {
     double p[3], size = 0, det = 0;
     for (int i = 0; i < 3; i++) {
@@ -132,7 +134,8 @@ static bool apart_meet(const point p[3], const point q[3]) {
     return false;
 }
 
-/* Corner 0 of both is shared. What they share beyond it reaches along a ray from it to the opposite edge of one of them. */
+/* Corner 0 of both is shared. What they share beyond it reaches along a ray from it to the opposite edge of one of
+ * them. */
 static bool at_corner_meet(const point p[3], const point q[3]) {
     int p1 = lathe__orient3d(q[0], q[1], q[2], p[1]), p2 = lathe__orient3d(q[0], q[1], q[2], p[2]);
     if (p1 * p2 > 0) return false;
@@ -171,14 +174,36 @@ static bool triangles_meet(const lathe_mesh *mesh, uint32_t first, uint32_t seco
     return shared == 2 ? at_edge_meet(p[1], p[2], p[0], q[0]) : shared == 1 ? at_corner_meet(p, q) : apart_meet(p, q);
 }
 
+bool lathe__triangles_meet(const lathe_mesh *mesh, uint32_t first, uint32_t second) {
+    return triangles_meet(mesh, first, second);
+}
+
 /* ---- all pairs whose boxes touch ---- */
 
+/* An item is a triangle in no fan, or the mesh's triangle_count plus the number of a fan. */
 typedef struct join {
     const lathe_mesh *mesh;
+    lathe_fans fans;
+    uint32_t *items, count; /* triangles, then fans */
     const lathe_box_tree *tree;
-    const uint32_t *order; /* triangle of each item */
+    const uint32_t *order; /* the items as they are in the tree */
     uint64_t found;
 } join;
+
+static uint64_t fans_meet(const lathe_fan *a, const lathe_fan *b) {
+    uint64_t found = 0;
+    if (a->count < b->count) return fans_meet(b, a);
+    for (uint32_t k = 0; k < b->count; k++) found += lathe__fan_meetings(a, b->triangles[k]);
+    return found;
+}
+
+static uint64_t items_meet(const join *j, uint32_t a, uint32_t b) {
+    uint32_t first = j->mesh->triangle_count;
+    if (a < first && b < first) return triangles_meet(j->mesh, a, b);
+    if (a < first) return lathe__fan_meetings(&j->fans.fans[b - first], a);
+    if (b < first) return lathe__fan_meetings(&j->fans.fans[a - first], b);
+    return fans_meet(&j->fans.fans[a - first], &j->fans.fans[b - first]);
+}
 
 static int touching(const lathe_box_node *a, int child, const lathe_box_node *b) {
     lathe_i4 mask = {-1, -1, -1, -1};
@@ -202,7 +227,7 @@ static void join_nodes(join *j, uint32_t level, size_t a, size_t b) {
             if (level)
                 join_nodes(j, level - 1, first, second);
             else
-                j->found += triangles_meet(j->mesh, j->order[first], j->order[second]);
+                j->found += items_meet(j, j->order[first], j->order[second]);
         }
     }
 }
@@ -214,54 +239,78 @@ static bool is_sound(const lathe_mesh *mesh, const uint32_t t[3]) {
 }
 
 /* Rounding to float is monotone: boxes that touch on the lattice still touch. */
-static lathe_box triangle_box(const lathe_mesh *mesh, const uint32_t t[3]) {
-    lathe_box box = lathe__box_empty();
+static void add_triangle(lathe_box *box, const lathe_mesh *mesh, const uint32_t t[3]) {
     for (int k = 0; k < 3; k++) {
         const int32_t *p = mesh->lattice[t[k]];
-        lathe__box_add(&box, (float[3]){(float)p[0], (float)p[1], (float)p[2]});
+        lathe__box_add(box, (float[3]){(float)p[0], (float)p[1], (float)p[2]});
     }
+}
+
+static lathe_box item_box(const join *j, uint32_t item) {
+    const lathe_mesh *mesh = j->mesh;
+    lathe_box box = lathe__box_empty();
+    if (item < mesh->triangle_count) {
+        add_triangle(&box, mesh, mesh->triangles[item]);
+        return box;
+    }
+    const lathe_fan *fan = &j->fans.fans[item - mesh->triangle_count];
+    for (uint32_t k = 0; k < fan->count; k++) add_triangle(&box, mesh, mesh->triangles[fan->triangles[k]]);
     return box;
 }
 
-static lathe_curve box_middles(const lathe_mesh *mesh, const uint32_t *sound, float (*middle)[3], uint32_t count) {
+static lathe_curve box_middles(const join *j, float (*middle)[3]) {
     lathe_box all = lathe__box_empty();
-    for (uint32_t k = 0; k < count; k++) {
-        lathe_box box = triangle_box(mesh, mesh->triangles[sound[k]]);
+    for (uint32_t k = 0; k < j->count; k++) {
+        lathe_box box = item_box(j, j->items[k]);
         for (int i = 0; i < 3; i++) middle[k][i] = (box.low[i] + box.high[i]) / 2;
         lathe__box_add(&all, middle[k]);
     }
     return lathe__curve_through(&all);
 }
 
-lathe_status lathe__mesh_intersections(uint64_t *out, const lathe_mesh *mesh) {
-    size_t n = mesh->triangle_count;
-    lathe_status status = LATHE_ERR_MEMORY;
+static lathe_status join_items(join *j) {
     lathe_box_tree tree = {0};
-    uint32_t count = 0, *sound = malloc((n + 1) * sizeof *sound), *order = malloc((n + 1) * sizeof *order);
-    float(*middle)[3] = malloc((n + 1) * sizeof *middle);
-    lathe_box *boxes = malloc((n + 1) * sizeof *boxes);
-    if (!sound || !order || !middle || !boxes) goto cleanup;
-    for (uint32_t k = 0; k < n; k++)
-        if (is_sound(mesh, mesh->triangles[k])) sound[count++] = k;
-    join j = {mesh, &tree, order, 0};
-    if (count) {
-        lathe_curve curve = box_middles(mesh, sound, middle, count);
-        if ((status = lathe__curve_order(order, NULL, (const float(*)[3])middle, count, &curve)) != LATHE_OK)
-            goto cleanup;
-        for (uint32_t k = 0; k < count; k++) {
-            order[k] = sound[order[k]];
-            boxes[k] = triangle_box(mesh, mesh->triangles[order[k]]);
-        }
-        if ((status = lathe__box_tree_build(&tree, boxes, count)) != LATHE_OK) goto cleanup;
-        join_nodes(&j, tree.level_count - 1, 0, 0);
+    size_t n = j->count;
+    uint32_t *order = malloc(n * sizeof *order);
+    float(*middle)[3] = malloc(n * sizeof *middle);
+    lathe_box *boxes = malloc(n * sizeof *boxes);
+    lathe_status status = order && middle && boxes ? LATHE_OK : LATHE_ERR_MEMORY;
+    if (!status) {
+        lathe_curve curve = box_middles(j, middle);
+        status = lathe__curve_order(order, NULL, (const float(*)[3])middle, j->count, &curve);
     }
-    *out = j.found;
-    status = LATHE_OK;
-cleanup:
-    free(sound);
+    for (size_t k = 0; !status && k < n; k++) {
+        order[k] = j->items[order[k]];
+        boxes[k] = item_box(j, order[k]);
+    }
+    if (!status) status = lathe__box_tree_build(&tree, boxes, j->count);
+    if (!status) {
+        j->tree = &tree;
+        j->order = order;
+        join_nodes(j, tree.level_count - 1, 0, 0);
+    }
     free(order);
     free(middle);
     free(boxes);
     lathe__box_tree_free(&tree);
+    return status;
+}
+
+lathe_status lathe__mesh_intersections(uint64_t *out, const lathe_mesh *mesh) {
+    join j = {.mesh = mesh};
+    if (mesh->triangle_count > UINT32_MAX / 2) return LATHE_ERR_LIMIT;
+    j.items = malloc(((size_t)mesh->triangle_count + 1) * sizeof *j.items);
+    if (!j.items) return LATHE_ERR_MEMORY;
+    for (uint32_t k = 0; k < mesh->triangle_count; k++)
+        if (is_sound(mesh, mesh->triangles[k])) j.items[j.count++] = k;
+    lathe_status status = lathe__fans_gather(&j.fans, mesh, j.items, &j.count);
+    for (uint32_t k = 0; !status && k < j.fans.count; k++) {
+        j.items[j.count++] = mesh->triangle_count + k; /* there is room: a fan took at least one triangle out */
+        j.found += lathe__fan_own_meetings(&j.fans.fans[k]);
+    }
+    if (!status && j.count) status = join_items(&j);
+    if (!status) *out = j.found;
+    free(j.items);
+    lathe__fans_free(&j.fans);
     return status;
 }

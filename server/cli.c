@@ -19,7 +19,8 @@ static const lathe_option *find_letter(const lathe_option *options, size_t count
 }
 
 /* Splits one argument that begins with '-' into its option and, if it is there, the value in the same argument. */
-static const lathe_option *split_argument(const char **value, const lathe_option *options, size_t count, const char *argument) {
+static const lathe_option *split_argument(const char **value, const lathe_option *options, size_t count,
+                                          const char *argument) {
     *value = NULL;
     if (argument[1] == '-') {
         const char *name = argument + 2, *equals = strchr(name, '=');
@@ -31,8 +32,8 @@ static const lathe_option *split_argument(const char **value, const lathe_option
     return option;
 }
 
-int lathe__parse_options(const lathe_command *command, int argc, char **argv, const lathe_option *options, size_t option_count,
-                         int *argument_count) {
+int lathe__parse_options(const lathe_command *command, int argc, char **argv, const lathe_option *options,
+                         size_t option_count, int *argument_count) {
     int kept = 0;
     bool ended = false;
     for (int i = 1; i < argc; i++) {
@@ -124,7 +125,8 @@ int lathe__finish_output(int status) {
     if (fclose(stdout) != 0) lost = true;
     if (!lost) return status;
     int code = errno;
-    if (code == EPIPE) return status == LATHE_EXIT_OK ? LATHE_EXIT_INPUT : status;   /* the reader has gone and knows it */
+    /* The reader has gone and knows it. */
+    if (code == EPIPE) return status == LATHE_EXIT_OK ? LATHE_EXIT_INPUT : status;
     lathe__input_error("standard output: %s: the output is not complete", code ? strerror(code) : "write error");
     return status == LATHE_EXIT_OK ? LATHE_EXIT_INPUT : status;
 }

@@ -29,10 +29,11 @@ typedef struct lathe_option {
 #define LATHE_OPTION_TEXT(name, letter, target) {name, letter, target, NULL, false}
 #define LATHE_OPTION_FLAG(name, target, on) {name, 0, NULL, target, on}
 enum { LATHE_PARSED = -1 };
-/* Parses argv[1..): `--name value`, `--name=value`, `-o value`, `-ovalue`, `--` ends options. The other arguments are moved to
- * argv[1..*argument_count]. Returns LATHE_PARSED, or an exit status (--help was answered, or the usage is wrong and said). */
-int lathe__parse_options(const lathe_command *command, int argc, char **argv, const lathe_option *options, size_t option_count,
-                         int *argument_count);
+/* Parses argv[1..): `--name value`, `--name=value`, `-o value`, `-ovalue`, `--` ends options. The other arguments
+ * are moved to argv[1..*argument_count]. Returns LATHE_PARSED, or an exit status (--help was answered, or the usage
+ * is wrong and said). */
+int lathe__parse_options(const lathe_command *command, int argc, char **argv, const lathe_option *options,
+                         size_t option_count, int *argument_count);
 bool lathe__option_number(double *out, const char *text);                       /* finite, the whole text */
 bool lathe__option_integer(int64_t *out, const char *text, int64_t low, int64_t high);
 
@@ -71,8 +72,8 @@ typedef struct lathe_bake_arguments {
 void lathe__bake_arguments_defaults(lathe_bake_arguments *arguments);
 /* command is for complaints about usage. Returns an exit status. */
 int lathe__bake_input(const lathe_command *command, const lathe_bake_arguments *arguments);
-/* contour_bake.c: a volume; or a contour set, reconstructed and put on a grid of a->spacing mm. NULL spacing: the median of the
- * distances of its sections, but 64 to 384 voxels along the longest side; said on stderr unless quiet. */
+/* contour_bake.c: a volume; or a contour set, reconstructed and put on a grid of a->spacing mm. NULL spacing: the
+ * median of the distances of its sections, but 64 to 384 voxels along the longest side; said on stderr unless quiet. */
 lathe_status lathe__open_bake_input(lathe_volume **out, const lathe_bake_arguments *a, lathe_error *err);
 /* "dir/a.nii.gz" -> "a": the file's name without its volume suffix, cut to size. */
 void lathe__volume_stem(char *out, size_t size, const char *path);

@@ -70,8 +70,8 @@ static lathe_status add_all_labels(label_choice *choice, const lathe_label_table
 }
 
 /* "all", or numbers with commas between. The text was checked before. */
-static lathe_status choose_labels(label_choice *choice, const lathe_bake_arguments *arguments, const lathe_volume *volume,
-                                  lathe_error *err) {
+static lathe_status choose_labels(label_choice *choice, const lathe_bake_arguments *arguments,
+                                  const lathe_volume *volume, lathe_error *err) {
     lathe_label_table *table = NULL;
     lathe_status status = lathe_label_table_open(&table, arguments->input, err);
     if (status) return status;
@@ -111,14 +111,21 @@ static bool label_list_valid(const char *list) {
 }
 
 /* What --axis, --boundary and --topology say; axis -1: auto. */
-typedef struct bake_settings { int axis, boundary; double iso; bool iso_given, labels, keep; uint32_t levels; } bake_settings;
+typedef struct bake_settings {
+    int axis, boundary;
+    double iso;
+    bool iso_given, labels, keep;
+    uint32_t levels;
+} bake_settings;
 
 static int parse_settings(bake_settings *out, const lathe_command *command, const lathe_bake_arguments *a) {
     static const char *const axes[] = {"x", "y", "z"};
-    bake_settings s = {.axis = -1, .boundary = -1, .iso = 0, .iso_given = a->iso != NULL, .labels = a->label || a->labels};
+    bake_settings s = {
+        .axis = -1, .boundary = -1, .iso = 0, .iso_given = a->iso != NULL, .labels = a->label || a->labels};
     if ((a->iso != NULL) + (a->label != NULL) + (a->labels != NULL) > 1)
         return lathe__usage_error(command, "only one of --iso, --label and --labels");
-    if (a->iso && !lathe__option_number(&s.iso, a->iso)) return lathe__usage_error(command, "--iso %s: a number is needed", a->iso);
+    if (a->iso && !lathe__option_number(&s.iso, a->iso))
+        return lathe__usage_error(command, "--iso %s: a number is needed", a->iso);
     int64_t label;
     if (a->label && !lathe__option_integer(&label, a->label, -(1 << 24), 1 << 24))
         return lathe__usage_error(command, "--label %s: a whole number is needed", a->label);
@@ -188,7 +195,8 @@ static int bake_settled(bake_settings *settings, const lathe_bake_arguments *a, 
         }
     } else if (!settings->iso_given) {
         settings->iso = lathe_volume_otsu(volume);
-        if (!a->quiet) fprintf(stderr, "lathe: threshold %g chosen by Otsu's method (--iso sets another)\n", settings->iso);
+        if (!a->quiet)
+            fprintf(stderr, "lathe: threshold %g chosen by Otsu's method (--iso sets another)\n", settings->iso);
     }
     int result = bake_volume(volume, settings, a, &choice);
     free(choice.structures);
@@ -241,7 +249,8 @@ static int run(int argc, char **argv) {
         LATHE_OPTION_FLAG("exact", &a.exact, true),    LATHE_OPTION_FLAG("independent", &a.independent, true),
         LATHE_OPTION_FLAG("quiet", &a.quiet, true),    LATHE_OPTION_FLAG("json", &json, true),
     };
-    int count, status = lathe__parse_options(&lathe__command_bake, argc, argv, options, sizeof options / sizeof *options, &count);
+    int count, status = lathe__parse_options(&lathe__command_bake, argc, argv, options,
+                                             sizeof options / sizeof *options, &count);
     if (status != LATHE_PARSED) return status;
     if (count != 1) return lathe__usage_error(&lathe__command_bake, "one INPUT is needed");
     a.input = argv[1];
@@ -258,22 +267,24 @@ static int run(int argc, char **argv) {
 const lathe_command lathe__command_bake = {
     "bake", "turn a volume into an archive",
     "Usage: lathe bake INPUT [options] [-o OUT.lathe]\n\n"
-    "INPUT is NIfTI (.nii, .nii.gz) or the .json sidecar of a raw file. OUT appears when it is complete, or not at all;\n"
-    "default: INPUT's name with .lathe, in the current directory.\n\n"
+    "INPUT is NIfTI (.nii, .nii.gz) or the .json sidecar of a raw file. OUT appears when it is complete, or not\n"
+    "at all; default: INPUT's name with .lathe, in the current directory.\n\n"
     "  --iso V            the surface around value >= V; default: Otsu's threshold, which is printed\n"
     "  --label N          the surface of one label\n"
     "  --labels all|N,N   one surface for each label; names and colours from the table beside INPUT (as aal.nii.txt)\n"
     "  --axis A           slices across x, y, z or auto (default: the axis of the largest spacing, else z)\n"
-    "  --boundary B       edge (middle of pixel borders; default for labels) or iso (between grey values; default else)\n"
-    "  --topology T       own: each level has that of its slices, small components wait (default); keep: every level has\n"
-    "                     the components, cavities and tunnels of the last, which takes more bytes at the start\n"
+    "  --boundary B       edge (middle of pixel borders; default for labels) or iso (between grey values; default\n"
+    "                     else)\n"
+    "  --topology T       own: each level has that of its slices, small components wait (default); keep: every level\n"
+    "                     has the components, cavities and tunnels of the last, which takes more bytes at the start\n"
     "  --levels N         at most N levels, never a radius map; default: by the size, 3 to 12\n"
-    "  --spacing MM       of the grid that a contour set (.json with \"sections\") is put on; default: its sections' spacing\n"
+    "  --spacing MM       of the grid that a contour set (.json with \"sections\") is put on; default: its sections'\n"
+    "                     spacing\n"
     "  --name NAME        of the model; default: INPUT's name\n"
     "  --no-errors        do not measure the levels' errors (faster)\n"
     "  --no-draco         do not measure the levels' size in Draco (faster)\n"
-    "  --exact            every voxel as it is; else a star-shaped structure may become a radius map, if that is within\n"
-    "                     0.215 voxel RMS and 1 voxel anywhere for 3/4 of the bytes\n"
+    "  --exact            every voxel as it is; else a star-shaped structure may become a radius map, if that is\n"
+    "                     within 0.215 voxel RMS and 1 voxel anywhere for 3/4 of the bytes\n"
     "  --independent      each structure can be decoded alone (range requests), for about an eighth more bytes\n"
     "  --quiet            no progress bar, no summary\n"
     "  --json             print what `lathe info --json` prints\n",

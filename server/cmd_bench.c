@@ -51,7 +51,8 @@ static lathe_status step_through(lathe_decoder *decoder, bool all_levels, decode
 
 static void add_normals(float *normals, const float *positions, const uint32_t *indices, uint32_t triangle_count) {
     for (uint32_t i = 0; i < triangle_count; i++, indices += 3) {
-        const float *a = positions + 3 * (size_t)indices[0], *b = positions + 3 * (size_t)indices[1], *c = positions + 3 * (size_t)indices[2];
+        const float *a = positions + 3 * (size_t)indices[0], *b = positions + 3 * (size_t)indices[1],
+                    *c = positions + 3 * (size_t)indices[2];
         float p[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, q[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
         float n[3] = {p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]};
         for (int corner = 0; corner < 3; corner++)
@@ -68,7 +69,8 @@ static void make_unit(float *normals, uint32_t vertex_count) {
 }
 
 static lathe_status dress_mesh(const lathe_mesh *mesh, const lathe_transform *transform) {
-    float *positions = malloc((size_t)mesh->vertex_count * 12 + 1), *normals = calloc((size_t)mesh->vertex_count + 1, 12);
+    float *positions = malloc((size_t)mesh->vertex_count * 12 + 1),
+          *normals = calloc((size_t)mesh->vertex_count + 1, 12);
     uint32_t *indices = malloc((size_t)mesh->triangle_count * 12 + 1);
     lathe_status status = positions && normals && indices ? LATHE_OK : LATHE_ERR_MEMORY;
     if (!status) {
@@ -132,7 +134,8 @@ static lathe_status decode_best(decode_result *out, const uint8_t *stream, size_
     return LATHE_OK;
 }
 
-static lathe_status measure(decode_result *last, decode_result *all, const lathe_model *model, int repeats, lathe_error *err) {
+static lathe_status measure(decode_result *last, decode_result *all, const lathe_model *model, int repeats,
+                            lathe_error *err) {
     size_t size;
     const uint8_t *stream = lathe__whole_stream(model, &size);
     decode_result hashed;
@@ -143,7 +146,8 @@ static lathe_status measure(decode_result *last, decode_result *all, const lathe
     return status;
 }
 
-lathe_status lathe__measure_decoding(lathe__decode_speed *out, const lathe_model *model, int repeats, lathe_error *err) {
+lathe_status lathe__measure_decoding(lathe__decode_speed *out, const lathe_model *model, int repeats,
+                                     lathe_error *err) {
     size_t size;
     const uint8_t *stream = lathe__whole_stream(model, &size);
     for (int i = 0; i < repeats; i++) {
@@ -169,10 +173,11 @@ static void print_speed(const decode_result *last, const decode_result *all, boo
                (unsigned long long)last->hash);
         return;
     }
-    printf("last level only: %llu triangles in %.3f s CPU: %.2f M triangles/s\n", (unsigned long long)last->last_triangles,
-           last->seconds, 1e-6 * per_second(last->last_triangles, last->seconds));
-    printf("every level:     %llu triangles in %.3f s CPU: %.2f M triangles/s\n", (unsigned long long)all->triangles, all->seconds,
-           1e-6 * per_second(all->triangles, all->seconds));
+    printf("last level only: %llu triangles in %.3f s CPU: %.2f M triangles/s\n",
+           (unsigned long long)last->last_triangles, last->seconds,
+           1e-6 * per_second(last->last_triangles, last->seconds));
+    printf("every level:     %llu triangles in %.3f s CPU: %.2f M triangles/s\n", (unsigned long long)all->triangles,
+           all->seconds, 1e-6 * per_second(all->triangles, all->seconds));
     printf("hash of the last meshes: %016llx\n", (unsigned long long)last->hash);
 }
 
@@ -184,9 +189,11 @@ static int run_bench(int argc, char **argv) {
     const lathe_option options[] = {LATHE_OPTION_FLAG("json", &json, true), LATHE_OPTION_TEXT("repeat", 'r', &repeat)};
     int count, status = lathe__parse_options(command, argc, argv, options, 2, &count);
     if (status != LATHE_PARSED) return status;
-    if (count != 2 || strcmp(argv[1], "decode") != 0) return lathe__usage_error(command, "`decode FILE` or `bytes FILE` is needed");
+    if (count != 2 || strcmp(argv[1], "decode") != 0)
+        return lathe__usage_error(command, "`decode FILE` or `bytes FILE` is needed");
     int64_t repeats = 5;
-    if (repeat && !lathe__option_integer(&repeats, repeat, 1, 1000)) return lathe__usage_error(command, "--repeat %s: 1 to 1000", repeat);
+    if (repeat && !lathe__option_integer(&repeats, repeat, 1, 1000))
+        return lathe__usage_error(command, "--repeat %s: 1 to 1000", repeat);
     lathe_model *model = NULL;
     lathe_error err = {{0}};
     decode_result last, all;
@@ -223,17 +230,18 @@ const lathe_command lathe__command_bench = {
     "bench", "measure how fast an archive decodes and what its levels cost",
     "Usage: lathe bench decode FILE [--repeat N] [--json]\n"
     "       lathe bench bytes FILE|VOLUME [bake options] [--repeat N] [--meshes DIR] [-o OUT.lathe] [--json]\n\n"
-    "Decodes FILE (.lathe) to meshes, joints included, N times (5), and prints the CPU time of the fastest run: once with\n"
-    "only the last level's meshes built, once with those of every level; and the hash of the last meshes.\n\n"
-    "bytes: for each level of FILE (.lathe) the bytes of its packets, of what is fetched with them, of the level in Draco, and its\n"
-    "two-sided RMS and largest error in voxels. A VOLUME is baked first, and the CPU time of each stage of the bake printed; the\n"
-    "options are those of `lathe bake`. --meshes DIR writes each level's mesh there. --json also lists every packet.\n"
+    "Decodes FILE (.lathe) to meshes, joints included, N times (5), and prints the CPU time of the fastest run: once\n"
+    "with only the last level's meshes built, once with those of every level; and the hash of the last meshes.\n\n"
+    "bytes: for each level of FILE (.lathe) the bytes of its packets, of what is fetched with them, of the level in\n"
+    "Draco, and its two-sided RMS and largest error in voxels. A VOLUME is baked first, and the CPU time of each\n"
+    "stage of the bake printed; the options are those of `lathe bake`. --meshes DIR writes each level's mesh there.\n"
+    "--json also lists every packet.\n"
     "`make bench-bytes` compares with other coders.\n",
     run_bench};
 
 const lathe_command lathe__command_hash = {
     "hash", NULL,
     "Usage: lathe hash [--each] FILE\n\n"
-    "Prints the FNV-1a hash (64 bit) of every structure's last mesh: positions (int32), then triangles (uint32), little-endian.\n"
-    "With --each one number for each structure, each begun anew.\n",
+    "Prints the FNV-1a hash (64 bit) of every structure's last mesh: positions (int32), then triangles (uint32),\n"
+    "little-endian. With --each one number for each structure, each begun anew.\n",
     run_hash};

@@ -91,7 +91,8 @@ static double smallest_spacing(const double affine[3][4]) {
 
 static void list_pass(bytes_report *report, uint32_t level, uint32_t pass, uint64_t payload, uint64_t end) {
     if (!report->passes) return;
-    json_array_append_new(report->passes, json_pack("[I, I, I, I]", (json_int_t)level, (json_int_t)pass, (json_int_t)payload, (json_int_t)end));
+    json_array_append_new(report->passes, json_pack("[I, I, I, I]", (json_int_t)level, (json_int_t)pass,
+                                                    (json_int_t)payload, (json_int_t)end));
 }
 
 /* Where a client may stop with all structures alike: behind each pass of a pyramid's level, else behind the level. */
@@ -101,7 +102,8 @@ static uint32_t packets_of_pass(const lathe_header *header, uint32_t level) {
     return lathe__header_present(header, level);
 }
 
-static lathe_status walk_packets(bytes_report *report, lathe_reader *reader, const lathe_header *header, const uint8_t *start) {
+static lathe_status walk_packets(bytes_report *report, lathe_reader *reader, const lathe_header *header,
+                                 const uint8_t *start) {
     for (uint32_t level = 0; level < header->level_count; level++) {
         lathe_level_head head;
         lathe_status status = lathe__level_parse(&head, reader, header);
@@ -152,9 +154,11 @@ static lathe_status gather(whole_mesh *out, lathe_decoder *decoder) {
     for (uint32_t s = 0; s < lathe_decoder_structures(decoder); s++) {
         const lathe_mesh *mesh = lathe_decoder_mesh(decoder, s);
         if (!mesh) return LATHE_ERR_FORMAT;
-        float (*positions)[3] = realloc(out->positions, ((size_t)out->counts[0] + mesh->vertex_count + 1) * sizeof *positions);
+        float(*positions)[3] =
+            realloc(out->positions, ((size_t)out->counts[0] + mesh->vertex_count + 1) * sizeof *positions);
         if (positions) out->positions = positions;
-        uint32_t (*indices)[3] = realloc(out->indices, ((size_t)out->counts[1] + mesh->triangle_count + 1) * sizeof *indices);
+        uint32_t(*indices)[3] =
+            realloc(out->indices, ((size_t)out->counts[1] + mesh->triangle_count + 1) * sizeof *indices);
         if (indices) out->indices = indices;
         if (!positions || !indices) return LATHE_ERR_MEMORY;
         const lathe_transform *transform = lathe_decoder_transform(decoder, s);
@@ -232,14 +236,16 @@ static lathe_status measure(bytes_report *report, const lathe_model *model, cons
     report->info = lathe_model_describe(model);
     report->level_count = report->info->level_count;
     lathe_status status = count_packets(report, model, err);
-    for (uint32_t level = 0; !status && level < report->level_count; level++) status = measure_level(report, model, level, err);
+    for (uint32_t level = 0; !status && level < report->level_count; level++)
+        status = measure_level(report, model, level, err);
     return status || !folder ? status : dump_passes(model, folder, err);
 }
 
 /* ---- printing ---- */
 
 static int64_t new_vertices(const bytes_report *report, uint32_t level) {
-    return (int64_t)report->levels[level].info->vertices - (level ? (int64_t)report->levels[level - 1].info->vertices : 0);
+    return (int64_t)report->levels[level].info->vertices -
+           (level ? (int64_t)report->levels[level - 1].info->vertices : 0);
 }
 
 /* Bits of packets for each vertex that the level before had not; negative: there is none. */
@@ -254,8 +260,8 @@ static void number_or_dash(char out[16], double value, const char *format) {
 }
 
 static void print_text(const bytes_report *report, const stage_clock *clock, const lathe__decode_speed *speed) {
-    printf("%5s %9s %9s %9s %11s %11s %9s %9s %8s %8s\n", "level", "polar B", "+headers", "stream B", "Draco delta", "Draco whole",
-           "triangles", "bit/new v", "RMS", "max");
+    printf("%5s %9s %9s %9s %11s %11s %9s %9s %8s %8s\n", "level", "polar B", "+headers", "stream B", "Draco delta",
+           "Draco whole", "triangles", "bit/new v", "RMS", "max");
     uint64_t stream = 0;
     for (uint32_t i = 0; i < report->level_count; i++) {
         const level_row *row = &report->levels[i];
@@ -266,14 +272,17 @@ static void print_text(const bytes_report *report, const stage_clock *clock, con
         number_or_dash(delta, row->delta_failed ? -1 : (double)row->draco_delta, "%.0f");
         stream += row->fetched;
         printf("%5u %9llu %9llu %9llu %11s %11llu %9u %9s %8s %8s\n", i, (unsigned long long)row->payload,
-               (unsigned long long)(row->fetched - row->payload), (unsigned long long)stream, delta, (unsigned long long)row->draco,
-               row->info->triangles, bits, rms, most);
+               (unsigned long long)(row->fetched - row->payload), (unsigned long long)stream, delta,
+               (unsigned long long)row->draco, row->info->triangles, bits, rms, most);
     }
-    printf("errors: two-sided, the worse direction, in voxels of %g mm, against the trilinear isosurface, as the bake measured them\n",
-           report->voxel);
-    printf("decode with normals: %.2f M triangles/s, without: %.2f\n", 1e-6 * (double)speed->triangles / speed->with_normals,
-           1e-6 * (double)speed->triangles / speed->seconds);
-    for (int i = 0; i < clock->count; i++) printf("%s%s %.3f s", i ? ", " : "bake, CPU: ", clock->stages[i].name, clock->stages[i].seconds);
+    printf(
+        "errors: two-sided, the worse direction, in voxels of %g mm, against the trilinear isosurface, as the bake "
+           "measured them\n",
+        report->voxel);
+    printf("decode with normals: %.2f M triangles/s, without: %.2f\n",
+           1e-6 * (double)speed->triangles / speed->with_normals, 1e-6 * (double)speed->triangles / speed->seconds);
+    for (int i = 0; i < clock->count; i++)
+        printf("%s%s %.3f s", i ? ", " : "bake, CPU: ", clock->stages[i].name, clock->stages[i].seconds);
     if (clock->count) putchar('\n');
 }
 
@@ -282,22 +291,25 @@ static json_t *error_or_null(float mm, double voxel) { return mm >= 0 ? json_rea
 static json_t *json_row(const bytes_report *report, uint32_t i) {
     const level_row *row = &report->levels[i];
     double bits = bits_each(report, i);
-    return json_pack("{s:I, s:I, s:I, s:I, s:I, s:o, s:I, s:I, s:I, s:o, s:o, s:o}", "level", (json_int_t)i, "packets", (json_int_t)row->packets,
-                     "payload", (json_int_t)row->payload, "fetched", (json_int_t)row->fetched, "draco", (json_int_t)row->draco,
-                     "draco_delta", row->delta_failed ? json_null() : json_integer((json_int_t)row->draco_delta), "vertices",
+    return json_pack("{s:I, s:I, s:I, s:I, s:I, s:o, s:I, s:I, s:I, s:o, s:o, s:o}", "level", (json_int_t)i, "packets",
+                     (json_int_t)row->packets, "payload", (json_int_t)row->payload, "fetched", (json_int_t)row->fetched,
+                     "draco", (json_int_t)row->draco, "draco_delta",
+                     row->delta_failed ? json_null() : json_integer((json_int_t)row->draco_delta), "vertices",
                      (json_int_t)row->info->vertices, "new_vertices", (json_int_t)new_vertices(report, i), "triangles",
-                     (json_int_t)row->info->triangles, "bits_per_new_vertex", bits < 0 ? json_null() : json_real(bits), "rms",
-                     error_or_null(row->info->error_rms_mm, report->voxel), "max", error_or_null(row->info->error_max_mm, report->voxel));
+                     (json_int_t)row->info->triangles, "bits_per_new_vertex", bits < 0 ? json_null() : json_real(bits),
+                     "rms", error_or_null(row->info->error_rms_mm, report->voxel), "max",
+                     error_or_null(row->info->error_max_mm, report->voxel));
 }
 
 static int print_json(const bytes_report *report, const stage_clock *clock, const lathe__decode_speed *speed) {
     json_t *levels = json_array(), *stages = json_object();
     for (uint32_t i = 0; i < report->level_count; i++) json_array_append_new(levels, json_row(report, i));
-    for (int i = 0; i < clock->count; i++) json_object_set_new(stages, clock->stages[i].name, json_real(clock->stages[i].seconds));
-    json_t *decode = json_pack("{s:I, s:f, s:f}", "triangles", (json_int_t)speed->triangles, "seconds", speed->seconds, "seconds_with_normals",
-                               speed->with_normals);
-    json_t *all = json_pack("{s:f, s:o, s:O, s:o, s:o}", "voxel_mm", report->voxel, "levels", levels, "passes", report->passes, "decode",
-                            decode, "bake_cpu_seconds", stages);
+    for (int i = 0; i < clock->count; i++)
+        json_object_set_new(stages, clock->stages[i].name, json_real(clock->stages[i].seconds));
+    json_t *decode = json_pack("{s:I, s:f, s:f}", "triangles", (json_int_t)speed->triangles, "seconds", speed->seconds,
+                               "seconds_with_normals", speed->with_normals);
+    json_t *all = json_pack("{s:f, s:o, s:O, s:o, s:o}", "voxel_mm", report->voxel, "levels", levels, "passes",
+                            report->passes, "decode", decode, "bake_cpu_seconds", stages);
     int failed = all ? json_dumpf(all, stdout, JSON_COMPACT | JSON_REAL_PRECISION(9)) : -1;
     if (!failed) putchar('\n');
     json_decref(all);
@@ -351,19 +363,28 @@ int lathe__bench_bytes(int argc, char **argv) {
     bool json = false;
     const char *folder = NULL, *repeat = NULL;
     const lathe_option options[] = {
-        LATHE_OPTION_TEXT("output", 'o', &a.output),   LATHE_OPTION_TEXT("iso", 0, &a.iso),
-        LATHE_OPTION_TEXT("label", 0, &a.label),       LATHE_OPTION_TEXT("labels", 0, &a.labels),
-        LATHE_OPTION_TEXT("axis", 0, &a.axis),         LATHE_OPTION_TEXT("boundary", 0, &a.boundary),
-        LATHE_OPTION_TEXT("topology", 0, &a.topology), LATHE_OPTION_TEXT("spacing", 0, &a.spacing),
-        LATHE_OPTION_FLAG("no-errors", &a.errors, false), LATHE_OPTION_FLAG("exact", &a.exact, true),
-        LATHE_OPTION_FLAG("independent", &a.independent, true), LATHE_OPTION_TEXT("levels", 0, &a.levels), LATHE_OPTION_TEXT("meshes", 0, &folder),
-        LATHE_OPTION_TEXT("repeat", 'r', &repeat),     LATHE_OPTION_FLAG("json", &json, true),
+        LATHE_OPTION_TEXT("output", 'o', &a.output),
+        LATHE_OPTION_TEXT("iso", 0, &a.iso),
+        LATHE_OPTION_TEXT("label", 0, &a.label),
+        LATHE_OPTION_TEXT("labels", 0, &a.labels),
+        LATHE_OPTION_TEXT("axis", 0, &a.axis),
+        LATHE_OPTION_TEXT("boundary", 0, &a.boundary),
+        LATHE_OPTION_TEXT("topology", 0, &a.topology),
+        LATHE_OPTION_TEXT("spacing", 0, &a.spacing),
+        LATHE_OPTION_FLAG("no-errors", &a.errors, false),
+        LATHE_OPTION_FLAG("exact", &a.exact, true),
+        LATHE_OPTION_FLAG("independent", &a.independent, true),
+        LATHE_OPTION_TEXT("levels", 0, &a.levels),
+        LATHE_OPTION_TEXT("meshes", 0, &folder),
+        LATHE_OPTION_TEXT("repeat", 'r', &repeat),
+        LATHE_OPTION_FLAG("json", &json, true),
     };
     int count, status = lathe__parse_options(command, argc, argv, options, sizeof options / sizeof *options, &count);
     if (status != LATHE_PARSED) return status;
     if (count != 2) return lathe__usage_error(command, "`bytes FILE` is needed");
     int64_t repeats = 5;
-    if (repeat && !lathe__option_integer(&repeats, repeat, 1, 10000)) return lathe__usage_error(command, "--repeat %s: 1 to 10000", repeat);
+    if (repeat && !lathe__option_integer(&repeats, repeat, 1, 10000))
+        return lathe__usage_error(command, "--repeat %s: 1 to 10000", repeat);
     a.input = argv[2];
     if (lathe__is_volume_path(a.input)) return bake_and_report(&a, json, folder, (int)repeats);
     stage_clock none;

@@ -1,6 +1,7 @@
 /* lathe draw: one contour of a slice with its rays, crossings, edge types and derivation tree, as SVG. */
 #include "centre.h"
 #include "cli.h"
+#include "contour_json.h"
 #include "derivation.h"
 #include "draw_contour.h"
 #include "mask.h"
@@ -69,7 +70,7 @@ static int64_t find_loop(const lathe_outline *o, int64_t wanted, lathe_arena *ar
 }
 
 /* A hole's contour is that of its points the other way round. */
-static lathe_status draw_loop(char **svg, size_t *size, lathe_drawing *d, const lathe_loop *loop,
+static lathe_status draw_loop(char **svg, size_t *size, const lathe_drawing *d, const lathe_loop *loop,
                               const draw_settings *s, lathe_arena *arena) {
     lathe_point *points = LATHE_NEW(arena, lathe_point, loop->count), centre;
     if (!points) return LATHE_ERR_MEMORY;
@@ -83,9 +84,36 @@ static lathe_status draw_loop(char **svg, size_t *size, lathe_drawing *d, const 
         status = lathe__make_ray_contour(&contour, arena, points, loop->count, centre, (uint32_t)s->rays,
                                          (uint32_t)(65536 * turns + 0.5) & 65535);
     if (!status) status = lathe__derive_alone(&tree, arena, &contour);
-    d->contour = &contour;
-    d->tree = &tree;
-    return status ? status : lathe__draw_contour(svg, size, d);
+    lathe_drawing whole = *d;
+    whole.contour = &contour;
+    whole.tree = &tree;
+    return status ? status : lathe__draw_contour(svg, size, &whole);
+}
+
+/* d: the outline, and the pixels if there are some. what: the title's begin, "slice 4 across z" or "section 4". */
+static int draw_outline(char **svg, size_t *size, const lathe_drawing *d, const char *what, const draw_settings *s,
+                        const draw_arguments *a, lathe_arena *arena) {
+    const lathe_outline *outline = d->outline;
+    if (!outline->loop_count) return lathe__input_error("draw: %s: %s has no loop", a->input, what);
+    int64_t found = find_loop(outline, s->loop, arena);
+    if (found == -2) return lathe__status_error("draw", a->input, LATHE_ERR_MEMORY, NULL);
+    if (found < 0)
+        return lathe__input_error("draw: %s: %s has %u loops, the last is --loop %d", a->input, what,
+                                  outline->loop_count, (int)outline->loop_count - 1);
+    char title[256], stem[128];
+    lathe__volume_stem(stem, sizeof stem, a->input);
+    snprintf(title, sizeof title, "%s, %s, %s %" PRId64 " of %u, %" PRId64 " rays", stem, what,
+             outline->loops[found].hole ? "hole, loop" : "loop", s->loop, outline->loop_count, s->rays);
+    lathe_drawing named = *d;
+    named.loop = (uint32_t)found;
+    named.title = title;
+    lathe_status status = draw_loop(svg, size, &named, &outline->loops[found], s, arena);
+    if (status == LATHE_ERR_LIMIT)
+        return lathe__input_error("draw: %s: more than %d edges: fewer --rays are needed", a->input,
+                                  LATHE_DRAW_MAX_EDGES);
+    if (status == LATHE_ERR_FORMAT)
+        return lathe__input_error("draw: %s: loop %" PRId64 " is too thin to have a centre inside", a->input, s->loop);
+    return status ? lathe__status_error("draw", a->input, status, NULL) : LATHE_EXIT_OK;
 }
 
 static int draw_slice(char **svg, size_t *size, const lathe_mask *mask, const draw_settings *s, const draw_arguments *a,
@@ -103,30 +131,14 @@ static int draw_slice(char **svg, size_t *size, const lathe_mask *mask, const dr
     int32_t *border;
     lathe_status status = lathe__trace_outline(&outline, &border, arena, &view);
     if (status) return lathe__status_error("draw", a->input, status, NULL);
-    int64_t found = find_loop(&outline, s->loop, arena);
-    if (found == -2) return lathe__status_error("draw", a->input, LATHE_ERR_MEMORY, NULL);
-    if (found < 0)
-        return lathe__input_error("draw: %s: slice %" PRId64 " has %u loops, the last is --loop %d", a->input, s->slice,
-                                  outline.loop_count, (int)outline.loop_count - 1);
-    char title[256], stem[128];
-    lathe__volume_stem(stem, sizeof stem, a->input);
-    snprintf(title, sizeof title, "%s, slice %" PRId64 " across %c, %s %" PRId64 " of %u, %" PRId64 " rays", stem,
-             s->slice, "xyz"[axis], outline.loops[found].hole ? "hole, loop" : "loop", s->loop, outline.loop_count,
-             s->rays);
+    char what[64];
+    snprintf(what, sizeof what, "slice %" PRId64 " across %c", s->slice, "xyz"[axis]);
     lathe_drawing d = {.pixels = view.pixels,
                        .width = view.width,
                        .height = view.height,
                        .row_words = view.row_words,
-                       .outline = &outline,
-                       .loop = (uint32_t)found,
-                       .title = title};
-    status = draw_loop(svg, size, &d, &outline.loops[found], s, arena);
-    if (status == LATHE_ERR_LIMIT)
-        return lathe__input_error("draw: %s: more than %d edges: fewer --rays are needed", a->input,
-                                  LATHE_DRAW_MAX_EDGES);
-    if (status == LATHE_ERR_FORMAT)
-        return lathe__input_error("draw: %s: loop %" PRId64 " is too thin to have a centre inside", a->input, s->loop);
-    return status ? lathe__status_error("draw", a->input, status, NULL) : LATHE_EXIT_OK;
+                       .outline = &outline};
+    return draw_outline(svg, size, &d, what, s, a, arena);
 }
 
 static int draw_volume(char **svg, size_t *size, const lathe_volume *volume, draw_settings *s,
@@ -145,6 +157,42 @@ static int draw_volume(char **svg, size_t *size, const lathe_volume *volume, dra
     int result = draw_slice(svg, size, &mask, s, a, axis, &arena);
     lathe__arena_free(&arena);
     lathe__mask_free(&mask);
+    return result;
+}
+
+static int open_and_draw_volume(char **svg, size_t *size, draw_settings *s, const draw_arguments *a) {
+    lathe_volume *volume = NULL;
+    lathe_error err = {{0}};
+    lathe_status status = lathe_volume_open(&volume, a->input, &err);
+    if (status) return lathe__status_error("draw", a->input, status, &err);
+    int result = draw_volume(svg, size, volume, s, a);
+    lathe_volume_close(&volume);
+    return result;
+}
+
+static int draw_section(char **svg, size_t *size, lathe_contour_set *set, const draw_settings *s,
+                        const draw_arguments *a) {
+    if (s->slice >= set->count)
+        return lathe__input_error("draw: %s: the set has sections 0 to %u, not %" PRId64, a->input, set->count - 1,
+                                  s->slice);
+    const lathe_section *section = &set->sections[s->slice];
+    const double *row = set->transform.m[2];
+    char what[64];
+    snprintf(what, sizeof what, "section %" PRId64 " at %.5g mm", s->slice, row[2] * section->height + row[3]);
+    lathe_drawing d = {.outline = &section->outline};
+    return draw_outline(svg, size, &d, what, s, a, &set->arena);
+}
+
+static int open_and_draw_set(char **svg, size_t *size, const draw_settings *s, const draw_arguments *a) {
+    lathe_contour_set set;
+    lathe_error err = {{0}};
+    if (a->iso || a->label || a->axis)
+        return lathe__usage_error(&lathe__command_draw,
+                                  "%s is a contour set: --iso, --label and --axis are for volumes", a->input);
+    lathe_status status = lathe__contour_json_open(&set, NULL, a->input, &err);
+    if (status) return lathe__status_error("draw", a->input, status, &err);
+    int result = draw_section(svg, size, &set, s, a);
+    lathe__contour_set_free(&set);
     return result;
 }
 
@@ -179,14 +227,10 @@ static int run(int argc, char **argv) {
     draw_settings settings;
     status = parse_settings(&settings, &a);
     if (status != LATHE_PARSED) return status;
-    lathe_volume *volume = NULL;
-    lathe_error err = {{0}};
-    lathe_status opened = lathe_volume_open(&volume, a.input, &err);
-    if (opened) return lathe__status_error("draw", a.input, opened, &err);
     char *svg = NULL;
     size_t size = 0;
-    status = draw_volume(&svg, &size, volume, &settings, &a);
-    lathe_volume_close(&volume);
+    status = lathe__is_contour_json(a.input) ? open_and_draw_set(&svg, &size, &settings, &a)
+                                             : open_and_draw_volume(&svg, &size, &settings, &a);
     if (status == LATHE_EXIT_OK) status = write_file(a.output, svg, size);
     free(svg);
     return status;
@@ -196,12 +240,14 @@ const lathe_command lathe__command_draw = {
     "draw", "draw a contour of a slice with its rays and derivation tree",
     "Usage: lathe draw INPUT --slice K -o FILE.svg [options]\n\n"
     "One loop of a slice as the method sees it: region, centre, rays, crossings, FOR, BACK, UP and DOWN edges in four\n"
-    "colours, and beside it the derivation tree. INPUT is a volume as `lathe bake` takes it.\n\n"
-    "  --slice K          slice number, counted in voxels from 0\n"
+    "colours, and beside it the derivation tree. INPUT is a volume as `lathe bake` takes it, or a contour set (.json "
+    "with\n"
+    "\"sections\", see docs/CONTOUR_SETS.md).\n\n"
+    "  --slice K          slice number, counted in voxels from 0; of a contour set: section, from 0 at the lowest\n"
     "  -o, --output FILE  the SVG file\n"
-    "  --iso V            the region value >= V; default: Otsu's threshold, which is printed\n"
-    "  --label N          the region of one label\n"
-    "  --axis A           slices across x, y, z or auto (default: the axis of the largest spacing, else z)\n"
+    "  --iso V            volumes: the region value >= V; default: Otsu's threshold, which is printed\n"
+    "  --label N          volumes: the region of one label\n"
+    "  --axis A           volumes: slices across x, y, z or auto (default: the axis of the largest spacing, else z)\n"
     "  --loop I           which loop of the slice: 0 (default) is the one with the largest area\n"
     "  --rays N           a power of two from 4 to 4096; default 16\n"
     "  --turn DEG         turns the first ray counter-clockwise\n",

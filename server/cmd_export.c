@@ -17,8 +17,8 @@ static bool find_format(mesh_format *out, const char *name) {
     return false;
 }
 
-static lathe_status write_mesh(const lathe_world_mesh *mesh, mesh_format format, const lathe_write_options *options, int bits,
-                               lathe_sink sink, void *context) {
+static lathe_status write_mesh(const lathe_world_mesh *mesh, mesh_format format, const lathe_write_options *options,
+                               int bits, lathe_sink sink, void *context) {
     switch (format) {
     case FORMAT_STL: return lathe_write_stl(mesh, options, sink, context);
     case FORMAT_PLY: return lathe_write_ply(mesh, options, sink, context);
@@ -43,9 +43,10 @@ typedef struct export_job {
     int64_t structure, level;
 } export_job;
 
-static lathe_status write_job(const export_job *job, const lathe_world_mesh *mesh, const lathe_write_options *options, lathe_sink sink,
-                              void *context, lathe_error *err) {
-    if (job->delta) return lathe_write_draco_delta(job->model, job->structure, (uint32_t)job->level, sink, context, err);
+static lathe_status write_job(const export_job *job, const lathe_world_mesh *mesh, const lathe_write_options *options,
+                              lathe_sink sink, void *context, lathe_error *err) {
+    if (job->delta)
+        return lathe_write_draco_delta(job->model, job->structure, (uint32_t)job->level, sink, context, err);
     return write_mesh(mesh, job->format, options, job->bits, sink, context);
 }
 
@@ -77,14 +78,17 @@ static int export_level(export_job *job, const lathe_model *model, const char *s
     if (structure_name) {
         structure = lathe_model_find(model, structure_name);
         if (structure < 0)
-            return lathe__input_error("export: %s: no structure \"%s\": `lathe info` lists them", job->input, structure_name);
+            return lathe__input_error("export: %s: no structure \"%s\": `lathe info` lists them", job->input,
+                                      structure_name);
     }
     if (level_text && strcmp(level_text, "last") != 0) {
         int64_t last = level;
         if (!lathe__option_integer(&level, level_text, 0, INT32_MAX))
-            return lathe__usage_error(&lathe__command_export, "--level %s: a level is a number from 0, or `last`", level_text);
+            return lathe__usage_error(&lathe__command_export, "--level %s: a level is a number from 0, or `last`",
+                                      level_text);
         if (level > last)
-            return lathe__input_error("export: %s: level %s: the last one is %lld", job->input, level_text, (long long)last);
+            return lathe__input_error("export: %s: level %s: the last one is %lld", job->input, level_text,
+                                      (long long)last);
     }
     lathe_world_mesh mesh;
     lathe_error err = {{0}};
@@ -103,7 +107,8 @@ static int export_level(export_job *job, const lathe_model *model, const char *s
 
 static int run(int argc, char **argv) {
     const lathe_command *command = &lathe__command_export;
-    const char *output = NULL, *level = NULL, *structure = NULL, *format = NULL, *bits = NULL, *smooth = NULL, *delta = NULL;
+    const char *output = NULL, *level = NULL, *structure = NULL, *format = NULL, *bits = NULL, *smooth = NULL,
+               *delta = NULL;
     const lathe_option options[] = {
         LATHE_OPTION_TEXT("output", 'o', &output),       LATHE_OPTION_TEXT("level", 'l', &level),
         LATHE_OPTION_TEXT("structure", 's', &structure), LATHE_OPTION_TEXT("format", 'f', &format),
@@ -119,7 +124,8 @@ static int run(int argc, char **argv) {
         const char *dot = strrchr(output, '.');
         format = dot ? dot + 1 : "";
         if (!find_format(&job.format, format))
-            return lathe__usage_error(command, "--format stl, ply, glb or drc is needed: \"%s\" does not tell it", output);
+            return lathe__usage_error(command, "--format stl, ply, glb or drc is needed: \"%s\" does not tell it",
+                                      output);
     } else if (!find_format(&job.format, format)) {
         return lathe__usage_error(command, "--format %s: it is one of stl, ply, glb, drc", format);
     }
@@ -128,9 +134,11 @@ static int run(int argc, char **argv) {
     job.delta = delta != NULL;
     if (delta) level = delta;
     int64_t bit_count = 0;
-    if (bits && !lathe__option_integer(&bit_count, bits, 1, 30)) return lathe__usage_error(command, "--bits %s: 1 to 30", bits);
+    if (bits && !lathe__option_integer(&bit_count, bits, 1, 30))
+        return lathe__usage_error(command, "--bits %s: 1 to 30", bits);
     job.bits = (int)bit_count;
-    if (smooth && !lathe__option_integer(&job.smooth, smooth, 1, 16)) return lathe__usage_error(command, "--smooth %s: 1 to 16", smooth);
+    if (smooth && !lathe__option_integer(&job.smooth, smooth, 1, 16))
+        return lathe__usage_error(command, "--smooth %s: 1 to 16", smooth);
     lathe_model *model = NULL;
     lathe_error err = {{0}};
     lathe_status opened = lathe_model_open(&model, job.input, &err);
@@ -142,13 +150,16 @@ static int run(int argc, char **argv) {
 
 const lathe_command lathe__command_export = {
     "export", "write one level as STL, PLY, GLB or Draco",
-    "Usage: lathe export FILE [--level N | --delta N] [--structure NAME] [--format stl|ply|glb|drc] [--smooth K] -o OUT\n\n"
-    "Writes one whole level of FILE (.lathe), in world mm (GLB: metres). OUT appears when it is complete, or not at all.\n\n"
+    "Usage: lathe export FILE [--level N | --delta N] [--structure NAME] [--format stl|ply|glb|drc] [--smooth K]\n"
+    "                    -o OUT\n\n"
+    "Writes one whole level of FILE (.lathe), in world mm (GLB: metres). OUT appears when it is complete, or not\n"
+    "at all.\n\n"
     "  -l, --level N          0 is the base shape; default: `last`, the finest\n"
     "  -s, --structure NAME   only this one; default: all in one file\n"
     "  -f, --format F         default: what OUT ends with\n"
     "      --smooth K         the smooth surface through the vertices, every edge in K pieces (1 to 16)\n"
-    "  -d, --delta N          drc: not the level but what a client lacks of it that has the one before (docs/DRACO_DELTAS.md)\n"
+    "  -d, --delta N          drc: not the level but what a client lacks of it that has the one before\n"
+    "                         (docs/DRACO_DELTAS.md)\n"
     "      --bits N           drc: bits of a coordinate, 11 by default\n"
     "  -o, --output OUT       `-` is standard output\n",
     run};

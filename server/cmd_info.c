@@ -19,12 +19,13 @@ static json_t *json_name(const char *name) {
 static json_t *json_error(float mm) { return mm >= 0 && isfinite(mm) ? json_real((double)mm) : json_null(); }
 
 static json_t *json_level(const lathe_level_info *level, uint32_t index) {
-    return json_pack("{s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:o, s:o, s:I, s:I, s:f}", "level", (json_int_t)index, "rays", (json_int_t)level->rays,
-                     "slices", (json_int_t)level->slices, "vertices", (json_int_t)level->vertices, "triangles",
-                     (json_int_t)level->triangles, "polar_bytes", (json_int_t)level->polar_bytes, "draco_bytes",
-                     (json_int_t)level->draco_bytes, "error_max_mm", json_error(level->error_max_mm), "error_rms_mm",
-                     json_error(level->error_rms_mm), "components", (json_int_t)level->components, "components_waiting",
-                     (json_int_t)level->components_waiting, "waiting_mm3", level->waiting_mm3);
+    return json_pack("{s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:o, s:o, s:I, s:I, s:f}", "level", (json_int_t)index, "rays",
+                     (json_int_t)level->rays, "slices", (json_int_t)level->slices, "vertices",
+                     (json_int_t)level->vertices, "triangles", (json_int_t)level->triangles, "polar_bytes",
+                     (json_int_t)level->polar_bytes, "draco_bytes", (json_int_t)level->draco_bytes, "error_max_mm",
+                     json_error(level->error_max_mm), "error_rms_mm", json_error(level->error_rms_mm), "components",
+                     (json_int_t)level->components, "components_waiting", (json_int_t)level->components_waiting,
+                     "waiting_mm3", level->waiting_mm3);
 }
 
 static json_t *json_levels(const lathe_level_info *levels, uint32_t count) {
@@ -45,8 +46,9 @@ static json_t *json_structures(const lathe_model_info *info) {
 
 int lathe__print_info_json(const lathe_model *model) {
     const lathe_model_info *info = lathe_model_describe(model);
-    json_t *root = json_pack("{s:o, s:o, s:s, s:o}", "structures", json_structures(info), "name", json_name(info->name), "topology",
-                             info->keep_topology ? "keep" : "own", "levels", json_levels(info->levels, info->level_count));
+    json_t *root = json_pack("{s:o, s:o, s:s, s:o}", "structures", json_structures(info), "name", json_name(info->name),
+                             "topology", info->keep_topology ? "keep" : "own", "levels",
+                             json_levels(info->levels, info->level_count));
     if (!root) return lathe__input_error("info: out of memory");
     json_dumpf(root, stdout, JSON_INDENT(1) | JSON_REAL_PRECISION(9));
     putchar('\n');
@@ -72,8 +74,8 @@ static void print_level(uint32_t index, const lathe_level_info *level) {
 }
 
 static void print_table(const char *name, const lathe_level_info *levels, uint32_t count) {
-    printf("\n%s\n  %5s %6s %7s %9s %10s %11s %11s %9s %9s %11s %10s\n", name, "level", "rays", "slices", "vertices", "triangles",
-           "polar bytes", "draco bytes", "rms mm", "max mm", "components", "waits mm3");
+    printf("\n%s\n  %5s %6s %7s %9s %10s %11s %11s %9s %9s %11s %10s\n", name, "level", "rays", "slices", "vertices",
+           "triangles", "polar bytes", "draco bytes", "rms mm", "max mm", "components", "waits mm3");
     for (uint32_t i = 0; i < count; i++) print_level(i, &levels[i]);
 }
 
@@ -83,8 +85,9 @@ static void print_info(const lathe_model *model) {
     size_t size;
     lathe_model_bytes(model, &size);
     char name[256];
-    printf("%s: %u structure%s, %u levels, %zu bytes; slices across %c, boundary %s", lathe__printable(name, sizeof name, info->name),
-           info->structure_count, info->structure_count == 1 ? "" : "s", info->level_count, size,
+    printf("%s: %u structure%s, %u levels, %zu bytes; slices across %c, boundary %s",
+           lathe__printable(name, sizeof name, info->name), info->structure_count,
+           info->structure_count == 1 ? "" : "s", info->level_count, size,
            (unsigned)info->axis < 3 ? axes[info->axis] : '?', info->boundary == LATHE_BOUNDARY_ISO ? "iso" : "edge");
     if (!isnan(info->iso)) printf(", iso %g", info->iso);
     printf(", topology %s", info->keep_topology ? "of the last level" : "of each level's own");
@@ -121,6 +124,6 @@ const lathe_command lathe__command_info = {
     "Prints what each level of each structure of FILE (.lathe) has: rays, slices, vertices, triangles, the bytes\n"
     "a client fetches for it, the bytes of the whole level in Draco, its error against the isosurface, how\n"
     "many of the region's components it shows and the volume of those that wait for a later level.\n\n"
-    "  --json   as {\"structures\": [{\"name\", \"levels\": [{\"level\", \"rays\", \"slices\", ...}]}]}; an error that was\n"
-    "           not measured is null\n",
+    "  --json   as {\"structures\": [{\"name\", \"levels\": [{\"level\", \"rays\", \"slices\", ...}]}]};\n"
+    "           an error that was not measured is null\n",
     run};

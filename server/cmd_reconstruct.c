@@ -37,11 +37,13 @@ static int read_contours(lathe_contour_set *set, const reconstruct_job *job) {
     return LATHE_EXIT_OK;
 }
 
-static lathe_status slice_volume(lathe_contour_set *set, const reconstruct_job *job, const lathe_volume *volume, lathe_error *err) {
+static lathe_status slice_volume(lathe_contour_set *set, const reconstruct_job *job, const lathe_volume *volume,
+                                 lathe_error *err) {
     lathe_mask mask;
     lathe_axis axis = job->axis < 0 ? lathe__axis_auto(volume) : (lathe_axis)job->axis;
     double iso = job->has_iso || job->has_label ? job->iso : lathe_volume_otsu(volume);
-    if (!job->has_iso && !job->has_label && !job->quiet) fprintf(stderr, "lathe: threshold %g chosen by Otsu's method (--iso sets another)\n", iso);
+    if (!job->has_iso && !job->has_label && !job->quiet)
+        fprintf(stderr, "lathe: threshold %g chosen by Otsu's method (--iso sets another)\n", iso);
     lathe_status status = job->has_label ? lathe__region_label(&mask, volume, axis, job->label, err)
                                          : lathe__region_threshold(&mask, volume, axis, iso, err);
     if (status) return status;
@@ -49,7 +51,8 @@ static lathe_status slice_volume(lathe_contour_set *set, const reconstruct_job *
     int fraction = job->has_label ? LATHE_FRACTION_ONE / 2 : lathe__mean_fraction(&mask, volume, axis, iso);
     status = lathe__contour_set_of_mask(set, &mask, &transform, fraction);
     lathe__mask_free(&mask);
-    return status ? lathe_fail(err, status, "the outlines could not be traced: %s", lathe_status_name(status)) : LATHE_OK;
+    return status ? lathe_fail(err, status, "the outlines could not be traced: %s", lathe_status_name(status))
+                  : LATHE_OK;
 }
 
 static int read_volume(lathe_contour_set *set, reconstruct_job *job) {
@@ -66,7 +69,8 @@ static int read_volume(lathe_contour_set *set, reconstruct_job *job) {
 
 /* ---- output ---- */
 
-static lathe_status write_mesh(const reconstruct_job *job, const lathe_world_mesh *mesh, lathe_sink sink, void *context) {
+static lathe_status write_mesh(const reconstruct_job *job, const lathe_world_mesh *mesh, lathe_sink sink,
+                               void *context) {
     lathe_write_options options = {.model = NULL, .name = "reconstruction"};
     if (strcasecmp(job->format, "stl") == 0) return lathe_write_stl(mesh, &options, sink, context);
     if (strcasecmp(job->format, "ply") == 0) return lathe_write_ply(mesh, &options, sink, context);
@@ -84,7 +88,9 @@ static int write_output(const reconstruct_job *job, const lathe_world_mesh *mesh
     lathe_atomic_file *file = NULL;
     if (strcmp(job->output, "-") == 0) {
         lathe_status status = write_mesh(job, mesh, write_stdout, NULL);
-        return status == LATHE_OK || ferror(stdout) ? LATHE_EXIT_OK : lathe__status_error("reconstruct", "standard output", status, NULL);
+        return status == LATHE_OK || ferror(stdout)
+                   ? LATHE_EXIT_OK
+                   : lathe__status_error("reconstruct", "standard output", status, NULL);
     }
     lathe_status status = lathe_atomic_open(&file, job->output, &err);
     if (status) return lathe__status_error("reconstruct", job->output, status, &err);
@@ -126,31 +132,46 @@ static int export_mesh(const reconstruct_job *job, const lathe_mesh *mesh, const
 
 /* ---- report ---- */
 
-static void print_report(FILE *out, const reconstruct_job *job, const lathe_contour_set *set, const lathe_reconstruct_report *r,
-                         const lathe_mesh_report *check) {
+static void print_report(FILE *out, const reconstruct_job *job, const lathe_contour_set *set,
+                         const lathe_reconstruct_report *r, const lathe_mesh_report *check) {
     const lathe_slab_counts *b = &r->blocks;
     uint64_t loops = 0;
     for (uint32_t s = 0; s < set->count; s++) loops += set->sections[s].outline.loop_count;
-    fprintf(out, "%u sections, %llu contours -> %u vertices, %u triangles; components %llu, Euler characteristic %lld\n", set->count,
-            (unsigned long long)loops, r->vertices, r->triangles, (unsigned long long)check->components, (long long)check->euler);
-    fprintf(out, "links: %llu self, %llu one-to-one, %llu one-to-many, %llu many-to-many\n", (unsigned long long)b->links[0],
-            (unsigned long long)b->links[1], (unsigned long long)b->links[2], (unsigned long long)b->links[3]);
-    fprintf(out, "blocks: %llu tiled (%llu without trees), %llu branched (%llu by a mid-slice copy), %llu closed, %llu overlaid\n",
-            (unsigned long long)b->tubes, (unsigned long long)b->treeless, (unsigned long long)b->branched, (unsigned long long)b->copied,
-            (unsigned long long)b->closed, (unsigned long long)b->overlaid);
-    fprintf(out, "back to the overlay: blocks %llu crossing, %llu without a polygon, %llu with holes in their overlap; whole slabs %u of %u "
-            "(%u crossing, %u torn, %u flat)\n", (unsigned long long)b->crossed, (unsigned long long)b->refused, (unsigned long long)b->handles,
-            r->overlaid, r->slabs, r->crossing, r->torn, r->flat);
-    if (b->repaired) fprintf(out, "rank order clustering: %llu relations put right by components\n", (unsigned long long)b->repaired);
+    fprintf(out,
+            "%u sections, %llu contours -> %u vertices, %u triangles; components %llu, Euler characteristic %lld\n",
+            set->count, (unsigned long long)loops, r->vertices, r->triangles, (unsigned long long)check->components,
+            (long long)check->euler);
+    fprintf(out, "links: %llu self, %llu one-to-one, %llu one-to-many, %llu many-to-many\n",
+            (unsigned long long)b->links[0], (unsigned long long)b->links[1], (unsigned long long)b->links[2],
+            (unsigned long long)b->links[3]);
+    fprintf(
+        out,
+        "blocks: %llu tiled (%llu without trees), %llu branched (%llu by a mid-slice copy), %llu closed, "
+        "%llu overlaid\n",
+        (unsigned long long)b->tubes, (unsigned long long)b->treeless, (unsigned long long)b->branched,
+        (unsigned long long)b->copied, (unsigned long long)b->closed, (unsigned long long)b->overlaid);
+    fprintf(
+        out,
+        "back to the overlay: blocks %llu crossing, %llu without a polygon, %llu with holes in their overlap; "
+        "whole slabs %u of %u "
+        "(%u crossing, %u torn, %u flat)\n",
+        (unsigned long long)b->crossed, (unsigned long long)b->refused, (unsigned long long)b->handles, r->overlaid,
+        r->slabs, r->crossing, r->torn, r->flat);
+    if (b->repaired)
+        fprintf(out, "rank order clustering: %llu relations put right by components\n",
+                (unsigned long long)b->repaired);
     if (r->moved)
-        fprintf(out, "%u sections touched their neighbours: moved by %.2g mm at most\n", r->moved, r->farthest * set->transform.m[0][0]);
-    if (r->separated) fprintf(out, "%u slabs could not be joined: their contours are closed one by one\n", r->separated);
+        fprintf(out, "%u sections touched their neighbours: moved by %.2g mm at most\n", r->moved,
+                r->farthest * set->transform.m[0][0]);
+    if (r->separated)
+        fprintf(out, "%u slabs could not be joined: their contours are closed one by one\n", r->separated);
     fprintf(out, "closed, manifold, free of self-intersections%s\n", job->smooth ? " (before smoothing)" : "");
 }
 
 static bool is_perfect(const lathe_mesh_report *r) {
-    return !r->boundary_edges && !r->nonmanifold_edges && !r->misoriented_edges && !r->nonmanifold_vertices && !r->degenerate_triangles &&
-           !r->duplicate_positions && !r->unused_vertices && !r->bad_indices && !r->self_intersections;
+    return !r->boundary_edges && !r->nonmanifold_edges && !r->misoriented_edges && !r->nonmanifold_vertices &&
+           !r->degenerate_triangles && !r->duplicate_positions && !r->unused_vertices && !r->bad_indices &&
+           !r->self_intersections;
 }
 
 static int reconstruct_set(const reconstruct_job *job, const lathe_contour_set *set) {
@@ -164,9 +185,11 @@ static int reconstruct_set(const reconstruct_job *job, const lathe_contour_set *
         lathe_mesh_free(&mesh);
         return lathe__status_error("reconstruct", job->input, status, &err);
     }
-    int result = is_perfect(&check) ? LATHE_EXIT_OK : lathe__input_error("reconstruct: %s: the surface has flaws", job->input);
+    int result =
+        is_perfect(&check) ? LATHE_EXIT_OK : lathe__input_error("reconstruct: %s: the surface has flaws", job->input);
     if (result == LATHE_EXIT_OK) result = export_mesh(job, &mesh, &set->transform);
-    if (result == LATHE_EXIT_OK && !job->quiet) print_report(strcmp(job->output, "-") ? stdout : stderr, job, set, &report, &check);
+    if (result == LATHE_EXIT_OK && !job->quiet)
+        print_report(strcmp(job->output, "-") ? stdout : stderr, job, set, &report, &check);
     lathe_mesh_free(&mesh);
     return result;
 }
@@ -180,21 +203,27 @@ static int choose(const char *text, const char *const *names, int count) {
 }
 
 typedef struct reconstruct_texts {
-    const char *output, *format, *iso, *label, *axis, *tiling, *links, *threshold, *branching, *mid, *rays, *smooth, *hierarchy, *strip, *twist;
+    const char *output, *format, *iso, *label, *axis, *tiling, *links, *threshold, *branching, *mid, *rays, *smooth,
+        *hierarchy, *strip, *twist;
 } reconstruct_texts;
 
 static int parse_methods(reconstruct_job *job, const lathe_command *command, const reconstruct_texts *t) {
-    static const char *const tilings[] = {"trees", "toroidal", "christiansen", "shortest"}, *const links[] = {"regions", "paper"};
+    static const char *const tilings[] = {"trees", "toroidal", "christiansen", "shortest"}, *const links[] = {"regions",
+                                                                                                              "paper"};
     static const char *const branchings[] = {"overlay", "paper"}, *const mids[] = {"never", "wide"};
     lathe_slab_options *o = &job->options.slab;
-    int tiling = choose(t->tiling, tilings, 4), link = choose(t->links, links, 2), branching = choose(t->branching, branchings, 2);
+    int tiling = choose(t->tiling, tilings, 4), link = choose(t->links, links, 2),
+        branching = choose(t->branching, branchings, 2);
     int mid = choose(t->mid, mids, 2);
     int64_t rays = 0;
-    if (tiling < 0) return lathe__usage_error(command, "--tiling %s: it is one of trees, toroidal, christiansen, shortest", t->tiling);
+    if (tiling < 0)
+        return lathe__usage_error(command, "--tiling %s: it is one of trees, toroidal, christiansen, shortest",
+                                  t->tiling);
     if (link < 0) return lathe__usage_error(command, "--links %s: it is one of regions, paper", t->links);
     if (branching < 0) return lathe__usage_error(command, "--branching %s: it is one of overlay, paper", t->branching);
     if (mid < 0) return lathe__usage_error(command, "--mid-slices %s: it is one of never, wide", t->mid);
-    if (t->threshold && (!lathe__option_number(&o->threshold, t->threshold) || !(o->threshold > 0 && o->threshold <= 1)))
+    if (t->threshold &&
+        (!lathe__option_number(&o->threshold, t->threshold) || !(o->threshold > 0 && o->threshold <= 1)))
         return lathe__usage_error(command, "--threshold %s: a number above 0, up to 1", t->threshold);
     if (t->rays && (!lathe__option_integer(&rays, t->rays, 8, 65536) || (rays & (rays - 1))))
         return lathe__usage_error(command, "--rays %s: a power of two from 8 to 65536", t->rays);
@@ -215,11 +244,14 @@ static int parse_input(reconstruct_job *job, const lathe_command *command, const
     job->format = t->format ? t->format : dot ? dot + 1 : "";
     bool known = false;
     for (int i = 0; i < 4; i++) known |= strcasecmp(job->format, formats[i]) == 0;
-    if (!known) return lathe__usage_error(command, "--format stl, ply, glb or drc is needed: \"%s\" does not tell it", t->output);
+    if (!known)
+        return lathe__usage_error(command, "--format stl, ply, glb or drc is needed: \"%s\" does not tell it",
+                                  t->output);
     if (axis < 0) return lathe__usage_error(command, "--axis %s: it is one of x, y, z, auto", t->axis);
     job->axis = axis - 1;
     if (t->iso && t->label) return lathe__usage_error(command, "only one of --iso and --label");
-    if (t->iso && !lathe__option_number(&job->iso, t->iso)) return lathe__usage_error(command, "--iso %s: a number is needed", t->iso);
+    if (t->iso && !lathe__option_number(&job->iso, t->iso))
+        return lathe__usage_error(command, "--iso %s: a number is needed", t->iso);
     if (t->label && !lathe__option_integer(&job->label, t->label, -(1 << 24), 1 << 24))
         return lathe__usage_error(command, "--label %s: a whole number is needed", t->label);
     if (t->smooth && !lathe__option_integer(&job->smooth, t->smooth, 1, 16))
@@ -229,7 +261,8 @@ static int parse_input(reconstruct_job *job, const lathe_command *command, const
     if (t->strip && (!lathe__option_number(&job->strip, t->strip) || job->strip <= 0))
         return lathe__usage_error(command, "--strip %s: a number of mm above 0", t->strip);
     lathe_error err;
-    if (t->twist && lathe__parse_twist(&job->twist, t->twist, &err)) return lathe__usage_error(command, "--twist %s: %s", t->twist, err.text);
+    if (t->twist && lathe__parse_twist(&job->twist, t->twist, &err))
+        return lathe__usage_error(command, "--twist %s: %s", t->twist, err.text);
     job->has_iso = t->iso != NULL;
     job->has_label = t->label != NULL;
     return LATHE_PARSED;
@@ -284,18 +317,21 @@ static int run(int argc, char **argv) {
 const lathe_command lathe__command_reconstruct = {
     "reconstruct", "a surface from cross-sections, by the papers' methods",
     "Usage: lathe reconstruct INPUT -o OUT.stl|ply|glb|drc [options]\n\n"
-    "INPUT is a contour set (.json with \"sections\", see docs/CONTOUR_SETS.md) or a volume, whose slices are traced. The surface\n"
-    "is closed, manifold and free of self-intersections whatever is chosen here: what would not be falls back to the lifted overlay.\n\n"
+    "INPUT is a contour set (.json with \"sections\", see docs/CONTOUR_SETS.md) or a volume, whose slices are traced.\n"
+    "The surface is closed, manifold and free of self-intersections whatever is chosen here: what would not be falls\n"
+    "back to the lifted overlay.\n\n"
     "      --iso V, --label N    volumes: which region; default: Otsu's threshold\n"
     "      --axis x|y|z|auto     volumes: slices lie across it\n"
-    "      --tiling T            one-to-one links: trees (default; derivation trees), toroidal (least area), christiansen, shortest\n"
+    "      --tiling T            one-to-one links: trees (default; derivation trees), toroidal (least area),\n"
+    "                            christiansen, shortest\n"
     "      --rays N              trees: rays of a contour, a power of two; default: by its size\n"
-    "      --links L             regions (default: contours whose regions overlap, with the topology that the overlap has),\n"
-    "                            paper (overlap degree of convex hulls)\n"
+    "      --links L             regions (default: contours whose regions overlap, with the topology that the\n"
+    "                            overlap has), paper (overlap degree of convex hulls)\n"
     "      --threshold X         of --links paper; default 0.45\n"
     "      --branching B         overlay (default), paper (exterior and interior polygons)\n"
     "      --mid-slices M        --branching paper: never (default), wide (copies in the middle of high slabs)\n"
-    "      --hierarchy MM        first fewer points: edges within MM of the contours, by the hierarchy without intersections\n"
+    "      --hierarchy MM        first fewer points: edges within MM of the contours, by the hierarchy without\n"
+    "                            intersections\n"
     "      --strip MM            first polygons instead of staircases: chords within MM of the contours\n"
     "      --twist none|DEG|auto trees: rays turn from slice to slice with the shape\n"
     "      --smooth K            writes the smooth surface, every edge in K pieces (1 to 16)\n"

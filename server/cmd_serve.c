@@ -1,4 +1,5 @@
-/* lathe serve: archives over HTTP. Volumes among the files are baked first, into a folder that goes when the server ends. */
+/* lathe serve: archives over HTTP. Volumes among the files are baked first, into a folder that goes when the server
+ * ends. */
 #include "cli.h"
 #include "server.h"
 #include <errno.h>
@@ -30,7 +31,8 @@ static int make_folder(serve_setup *setup) {
     if (!temporary || strlen(temporary) > 40) temporary = "/tmp";
     char folder[sizeof setup->folder];
     snprintf(folder, sizeof folder, "%s/lathe-XXXXXX", temporary);
-    if (!mkdtemp(folder)) return lathe__input_error("serve: %s: %s: a volume is baked there: set TMPDIR", folder, strerror(errno));
+    if (!mkdtemp(folder))
+        return lathe__input_error("serve: %s: %s: a volume is baked there: set TMPDIR", folder, strerror(errno));
     memcpy(setup->folder, folder, sizeof folder);
     return LATHE_EXIT_OK;
 }
@@ -46,7 +48,8 @@ static char *baked_path(const serve_setup *setup, const char *volume) {
     char stem[128], path[256];
     lathe__volume_stem(stem, sizeof stem, volume);
     snprintf(path, sizeof path, "%s/%s.lathe", setup->folder, stem);
-    for (unsigned i = 2; name_taken(setup, path); i++) snprintf(path, sizeof path, "%s/%s-%u.lathe", setup->folder, stem, i);
+    for (unsigned i = 2; name_taken(setup, path); i++)
+        snprintf(path, sizeof path, "%s/%s-%u.lathe", setup->folder, stem, i);
     return strdup(path);
 }
 
@@ -94,7 +97,8 @@ static int run(int argc, char **argv) {
     int count, status = lathe__parse_options(command, argc, argv, options, sizeof options / sizeof *options, &count);
     if (status != LATHE_PARSED) return status;
     int64_t number = serve.port;
-    if (port && !lathe__option_integer(&number, port, 0, 65535)) return lathe__usage_error(command, "--port %s: 0 to 65535", port);
+    if (port && !lathe__option_integer(&number, port, 0, 65535))
+        return lathe__usage_error(command, "--port %s: 0 to 65535", port);
     serve.port = (uint16_t)number;
     static char here[] = ".";
     char *current[] = {here};
@@ -116,6 +120,6 @@ const lathe_command lathe__command_serve = {
     "  -p, --port P      8080 by default; 0: any free one, which is printed\n"
     "  -b, --bind ADDR   127.0.0.1 by default: only this machine; 0.0.0.0: everyone who can reach it\n"
     "      --quiet       no access log\n\n"
-    "Environment: LATHE_MAX_CONNECTIONS, LATHE_THREADS, LATHE_HEADER_SECONDS, LATHE_IDLE_SECONDS, LATHE_DRAIN_SECONDS,\n"
-    "LATHE_CACHE_MB (docs/HTTP_API.md).\n",
+    "Environment: LATHE_MAX_CONNECTIONS, LATHE_THREADS, LATHE_HEADER_SECONDS, LATHE_IDLE_SECONDS,\n"
+    "LATHE_DRAIN_SECONDS, LATHE_CACHE_MB (docs/HTTP_API.md).\n",
     run};

@@ -1,4 +1,5 @@
-/* lathe verify: every level of every structure is a surface without flaws, and the last one has the topology of its voxels. */
+/* lathe verify: every level of every structure is a surface without flaws, and the last one has the topology of its
+ * voxels. */
 #include "cli.h"
 #include "mask.h"
 #include "mesh.h"
@@ -11,7 +12,8 @@
 
 typedef struct level_result {
     bool seen;
-    bool topology;                 /* must be that of the voxels: the last level, and every level of an archive that keeps it */
+    bool topology;                 /* must be that of the voxels: the last level, and every level of an archive that
+                                    * keeps it */
     lathe_mesh_report report;
     uint64_t float_duplicates;
     bool counts_match;             /* vertices and triangles are those of the index */
@@ -36,12 +38,14 @@ typedef struct verification {
 
 /* ---- what must hold ---- */
 
-static uint64_t edge_flaws(const lathe_mesh_report *r) { return r->boundary_edges + r->nonmanifold_edges + r->misoriented_edges; }
+static uint64_t edge_flaws(const lathe_mesh_report *r) {
+    return r->boundary_edges + r->nonmanifold_edges + r->misoriented_edges;
+}
 
 static uint64_t shape_flaws(const level_result *level) {
     const lathe_mesh_report *r = &level->report;
-    return r->nonmanifold_vertices + r->degenerate_triangles + r->duplicate_positions + r->unused_vertices + r->bad_indices +
-           level->float_duplicates;
+    return r->nonmanifold_vertices + r->degenerate_triangles + r->duplicate_positions + r->unused_vertices +
+           r->bad_indices + level->float_duplicates;
 }
 
 static bool topology_matches(const structure_result *structure, const level_result *level) {
@@ -72,23 +76,27 @@ static lathe_status prepare(verification *v) {
         uint32_t levels = v->info->structures[i].level_count;
         v->structures[i].levels = calloc(levels ? levels : 1, sizeof(level_result));
         if (!v->structures[i].levels) return LATHE_ERR_MEMORY;
-        for (uint32_t n = 0; n < levels; n++) v->structures[i].levels[n].topology = v->info->keep_topology || n + 1 == levels;
+        for (uint32_t n = 0; n < levels; n++)
+            v->structures[i].levels[n].topology = v->info->keep_topology || n + 1 == levels;
     }
     return LATHE_OK;
 }
 
 static lathe_status check_step(verification *v, lathe_decoder *decoder, const lathe_step *step, lathe_error *err) {
     if (step->structure >= v->info->structure_count || step->level >= v->info->structures[step->structure].level_count)
-        return lathe_fail(err, LATHE_ERR_FORMAT, "the stream has structure %u at level %u, the index has not", step->structure,
-                          step->level);
+        return lathe_fail(err, LATHE_ERR_FORMAT, "the stream has structure %u at level %u, the index has not",
+                          step->structure, step->level);
     const lathe_mesh *mesh = lathe_decoder_mesh(decoder, step->structure);
     if (!mesh) return lathe_fail(err, LATHE_ERR_FORMAT, "%s", lathe_decoder_error(decoder));
     level_result *level = &v->structures[step->structure].levels[step->level];
     const lathe_level_info *stated = &v->info->structures[step->structure].levels[step->level];
     lathe_status status = lathe__mesh_check(&level->report, mesh, v->intersections);
     if (!status)
-        status = lathe__mesh_float_duplicates(&level->float_duplicates, mesh, lathe_decoder_transform(decoder, step->structure));
-    if (status) return lathe_fail(err, status, "structure %u, level %u: %s", step->structure, step->level, lathe_status_name(status));
+        status = lathe__mesh_float_duplicates(&level->float_duplicates, mesh,
+                                              lathe_decoder_transform(decoder, step->structure));
+    if (status)
+        return lathe_fail(err, status, "structure %u, level %u: %s", step->structure, step->level,
+                          lathe_status_name(status));
     level->counts_match = mesh->vertex_count == stated->vertices && mesh->triangle_count == stated->triangles;
     level->hash = lathe__hash_mesh(LATHE_FNV_START, mesh);
     level->seen = true;
@@ -143,8 +151,8 @@ static lathe_status region_of(lathe_mask *mask, const voxel_source *source, cons
 }
 
 /* A structure that the volume has not is expected to have no component, so that it fails. */
-static lathe_status compare_structure(structure_result *structure, const lathe_structure_info *info, const verification *v,
-                                      const voxel_source *source, lathe_error *err) {
+static lathe_status compare_structure(structure_result *structure, const lathe_structure_info *info,
+                                      const verification *v, const voxel_source *source, lathe_error *err) {
     lathe_mask mask;
     memset(&mask, 0, sizeof mask);
     lathe_status status = region_of(&mask, source, v->info, info->label, err);
@@ -198,10 +206,12 @@ static lathe_status compare_meshes(verification *v, const lathe_model *encoded) 
 
 static void expect_nothing(verification *v) {
     for (uint32_t i = 0; i < v->info->structure_count; i++)
-        for (uint32_t n = 0; n < v->info->structures[i].level_count; n++) v->structures[i].levels[n].encoded_differs = true;
+        for (uint32_t n = 0; n < v->info->structures[i].level_count; n++)
+            v->structures[i].levels[n].encoded_differs = true;
 }
 
-/* A volume that cannot be baked so is another one: every level differs. Levels that the second bake has not, differ too. */
+/* A volume that cannot be baked so is another one: every level differs. Levels that the second bake has not, differ
+ * too. */
 static lathe_status compare_with_encoded(verification *v, const lathe_volume *volume, lathe_error *err) {
     expect_nothing(v);
     lathe_rebaked bytes = {NULL, 0, 0};
@@ -240,7 +250,8 @@ static level_sum sum_level(const verification *v, uint32_t n) {
         sum.edges += edge_flaws(&level->report);
         sum.shapes += shape_flaws(level);
         sum.intersections += level->report.self_intersections;
-        sum.mismatches += !level->seen || !level->counts_match || level->encoded_differs || (level->topology && s->compared && !topology_matches(s, level));
+        sum.mismatches += !level->seen || !level->counts_match || level->encoded_differs ||
+                          (level->topology && s->compared && !topology_matches(s, level));
         sum.components += level->report.components;
         sum.euler += level->report.euler;
         sum.triangles += v->info->structures[i].levels[n].triangles;
@@ -267,18 +278,19 @@ static void print_flaw(const verification *v, uint32_t i, uint32_t n) {
                r->unused_vertices, r->bad_indices);
     if (r->self_intersections) printf(" %" PRIu64 " self-intersections;", r->self_intersections);
     if (level->topology && s->compared && !topology_matches(s, level))
-        printf(" %" PRIu64 " components and Euler characteristic %" PRId64 ", the voxels have %" PRId64 " and %" PRId64 ";",
+        printf(" %" PRIu64 " components and Euler characteristic %" PRId64 ", the voxels have %" PRId64 " and %" PRId64
+               ";",
                r->components, r->euler, s->expected_components, s->expected_euler);
     putchar('\n');
 }
 
 static void print_table(const verification *v, bool with_volume) {
-    printf("%5s %10s %10s %10s %10s %10s %14s %10s %8s\n", "level", "structures", "triangles", "edge flaws", "other", "mismatches",
-           "intersections", "components", "euler");
+    printf("%5s %10s %10s %10s %10s %10s %14s %10s %8s\n", "level", "structures", "triangles", "edge flaws", "other",
+           "mismatches", "intersections", "components", "euler");
     for (uint32_t n = 0; n < v->info->level_count; n++) {
         level_sum s = sum_level(v, n);
-        printf("%5u %6" PRIu64 "/%-3" PRIu64 " %10" PRIu64 " %10" PRIu64 " %10" PRIu64 " %10" PRIu64 " ", n, s.passed, s.structures, s.triangles, s.edges,
-               s.shapes, s.mismatches);
+        printf("%5u %6" PRIu64 "/%-3" PRIu64 " %10" PRIu64 " %10" PRIu64 " %10" PRIu64 " %10" PRIu64 " ", n, s.passed,
+               s.structures, s.triangles, s.edges, s.shapes, s.mismatches);
         if (v->intersections) printf("%14" PRIu64, s.intersections);
         else printf("%14s", "not counted");
         printf(" %10" PRIu64 " %8" PRId64 "\n", s.components, s.euler);
@@ -286,19 +298,22 @@ static void print_table(const verification *v, bool with_volume) {
     for (uint32_t i = 0; i < v->info->structure_count; i++)
         for (uint32_t n = 0; n < v->info->structures[i].level_count; n++)
             if (!level_passes(&v->structures[i], &v->structures[i].levels[n])) print_flaw(v, i, n);
-    printf("checksums right; %s; %s\n", !with_volume ? "no volume to compare with" : v->info->keep_topology ? "topology of every level compared with the voxels" : "topology of each last level compared with the voxels",
+    printf("checksums right; %s; %s\n",
+           !with_volume             ? "no volume to compare with"
+           : v->info->keep_topology ? "topology of every level compared with the voxels"
+                                    : "topology of each last level compared with the voxels",
            v->failures ? "FAILED" : "passed");
 }
 
 static json_t *json_level_result(const structure_result *s, const level_result *level, uint32_t n) {
     const lathe_mesh_report *r = &level->report;
-    return json_pack("{s:I, s:b, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I}", "level", (json_int_t)n, "passed",
-                     level_passes(s, level), "open_edges", (json_int_t)r->boundary_edges, "nonmanifold_edges",
-                     (json_int_t)r->nonmanifold_edges, "misoriented_edges", (json_int_t)r->misoriented_edges,
-                     "nonmanifold_vertices", (json_int_t)r->nonmanifold_vertices, "degenerate_triangles",
-                     (json_int_t)r->degenerate_triangles, "duplicate_positions",
-                     (json_int_t)(r->duplicate_positions + level->float_duplicates), "self_intersections",
-                     (json_int_t)r->self_intersections, "components", (json_int_t)r->components, "euler", (json_int_t)r->euler);
+    return json_pack(
+        "{s:I, s:b, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I}", "level", (json_int_t)n, "passed",
+        level_passes(s, level), "open_edges", (json_int_t)r->boundary_edges, "nonmanifold_edges",
+        (json_int_t)r->nonmanifold_edges, "misoriented_edges", (json_int_t)r->misoriented_edges, "nonmanifold_vertices",
+        (json_int_t)r->nonmanifold_vertices, "degenerate_triangles", (json_int_t)r->degenerate_triangles,
+        "duplicate_positions", (json_int_t)(r->duplicate_positions + level->float_duplicates), "self_intersections",
+        (json_int_t)r->self_intersections, "components", (json_int_t)r->components, "euler", (json_int_t)r->euler);
 }
 
 static json_t *json_structure_result(const verification *v, uint32_t i) {
@@ -308,16 +323,18 @@ static json_t *json_structure_result(const verification *v, uint32_t i) {
         json_array_append_new(levels, json_level_result(s, &s->levels[n], n));
     json_t *object = json_pack("{s:o, s:o}", "name", name ? name : json_string("?"), "levels", levels);
     if (object && s->compared)
-        json_object_set_new(object, "voxels", json_pack("{s:I, s:I}", "components", (json_int_t)s->expected_components, "euler",
-                                                        (json_int_t)s->expected_euler));
+        json_object_set_new(object, "voxels",
+                            json_pack("{s:I, s:I}", "components", (json_int_t)s->expected_components, "euler",
+                                      (json_int_t)s->expected_euler));
     return object;
 }
 
 static void print_json(const verification *v) {
     json_t *structures = json_array();
-    for (uint32_t i = 0; i < v->info->structure_count; i++) json_array_append_new(structures, json_structure_result(v, i));
-    json_t *root = json_pack("{s:b, s:b, s:o}", "passed", v->failures == 0, "self_intersections_counted", v->intersections,
-                             "structures", structures);
+    for (uint32_t i = 0; i < v->info->structure_count; i++)
+        json_array_append_new(structures, json_structure_result(v, i));
+    json_t *root = json_pack("{s:b, s:b, s:o}", "passed", v->failures == 0, "self_intersections_counted",
+                             v->intersections, "structures", structures);
     json_dumpf(root, stdout, JSON_INDENT(1));
     putchar('\n');
     json_decref(root);
@@ -357,7 +374,8 @@ static int run(int argc, char **argv) {
     lathe_error err = {{0}};
     lathe_status opened = lathe_model_open(&model, argv[1], &err);
     if (opened) return lathe__status_error("verify", argv[1], opened, &err);
-    verification v = {.info = lathe_model_describe(model), .model = model, .intersections = intersections, .rebake = rebake};
+    verification v = {
+        .info = lathe_model_describe(model), .model = model, .intersections = intersections, .rebake = rebake};
     status = verify_model(&v, argv[1], count == 2 ? argv[2] : NULL, json);
     release(&v);
     lathe_model_close(&model);
@@ -367,12 +385,11 @@ static int run(int argc, char **argv) {
 const lathe_command lathe__command_verify = {
     "verify", "check every level of an archive",
     "Usage: lathe verify [--json] [--no-intersections] [--no-rebake] FILE [VOLUME]\n\n"
-    "Checks the checksums of FILE (.lathe), decodes it, and checks every level of every structure: closed, 2-manifold,\n"
-    "oriented, no degenerate triangle, no two vertices at one position, no two triangles that intersect, vertices and\n"
-    "triangles as the index says. With the VOLUME it was baked from: components and\n"
-    "Euler characteristic of the last level (with --topology keep: of every level) are those of the voxels, which are\n"
-    "counted independently; and the meshes are\n"
-    "those that the volume gives when it is baked again.\n"
+    "Checks the checksums of FILE (.lathe), decodes it, and checks every level of every structure: closed,\n"
+    "2-manifold, oriented, no degenerate triangle, no two vertices at one position, no two triangles that intersect,\n"
+    "vertices and triangles as the index says. With the VOLUME it was baked from: components and Euler\n"
+    "characteristic of the last level (with --topology keep: of every level) are those of the voxels, which are\n"
+    "counted independently; and the meshes are those that the volume gives when it is baked again.\n"
     "Exit status 1 when a check fails.\n\n"
     "  --json               every level of every structure\n"
     "  --no-intersections   do not count self-intersections (the only slow check)\n"

@@ -38,8 +38,8 @@ static lathe_status bake_contours(lathe_volume **out, const lathe_bake_arguments
     status = lathe__reconstruct(&mesh, NULL, &set, &options, err);
     if (!status) status = lathe__voxelise(out, &mesh, &set.transform, spacing, err);
     if (!status && !a->quiet)
-        fprintf(stderr, "lathe: contour set on a grid of %d x %d x %d voxels of %g mm (--spacing sets another)\n", (*out)->dims[0], (*out)->dims[1],
-                (*out)->dims[2], spacing);
+        fprintf(stderr, "lathe: contour set on a grid of %d x %d x %d voxels of %g mm (--spacing sets another)\n",
+                (*out)->dims[0], (*out)->dims[1], (*out)->dims[2], spacing);
     lathe_mesh_free(&mesh);
     lathe__contour_set_free(&set);
     return status;

@@ -1,4 +1,5 @@
-/* /models/{m}/deltas/{n}.drc: level n out of level n - 1 for stock Draco decoders; /draco/{m}: the page that applies them. */
+/* /models/{m}/deltas/{n}.drc: level n out of level n - 1 for stock Draco decoders; /draco/{m}: the page that applies
+ * them. */
 #include "service.h"
 #include <ctype.h>
 #include <stdio.h>
@@ -13,7 +14,8 @@ static lathe_status build_delta(lathe_body *body, void *context, lathe_error *er
     const delta *d = context;
     lathe_buffer out = {0};
     body->bytes = (const uint8_t *)"";
-    lathe_status status = lathe_write_draco_delta(d->entry->model, d->structure, d->level, lathe__buffer_append, &out, err);
+    lathe_status status =
+        lathe_write_draco_delta(d->entry->model, d->structure, d->level, lathe__buffer_append, &out, err);
     if (status) {
         lathe__buffer_free(&out);
         return status;
@@ -40,11 +42,16 @@ enum MHD_Result lathe__handle_draco_delta(lathe_request *request) {
     if (!d.entry) return result;
     uint32_t last = lathe__entry_levels(d.entry, -1) - 1;
     if (!lathe__parse_number(request->captures[1], &d.level) || d.level > last)
-        result = lathe__respond_problem(request, 404, "a Draco delta is named {n}.drc: the model has levels 0..%u", last);
+        result =
+            lathe__respond_problem(request, 404, "a Draco delta is named {n}.drc: the model has levels 0..%u", last);
     else if (lathe__request_structure(request, d.entry, &d.structure, &result)) {
-        lathe_recipe recipe = {
-            .type = "application/octet-stream", .traits = LATHE_RANGES, .entry = d.entry, .build = build_delta, .context = &d};
-        snprintf(recipe.key, sizeof recipe.key, "%s:%s:draco:%lld:%u", d.entry->id, d.entry->hash, (long long)d.structure, d.level);
+        lathe_recipe recipe = {.type = "application/octet-stream",
+                               .traits = LATHE_RANGES,
+                               .entry = d.entry,
+                               .build = build_delta,
+                               .context = &d};
+        snprintf(recipe.key, sizeof recipe.key, "%s:%s:draco:%lld:%u", d.entry->id, d.entry->hash,
+                 (long long)d.structure, d.level);
         name_file(&recipe, &d);
         result = lathe__respond(request, &recipe);
     }
@@ -65,7 +72,9 @@ enum MHD_Result lathe__handle_draco_page(lathe_request *request) {
     lathe_entry *entry = lathe__request_entry(request, &result);
     if (!entry) return result;
     lathe__entry_release(entry);
-    lathe_recipe recipe = {
-        .key = "draco-page", .type = "text/html; charset=utf-8", .traits = LATHE_COMPRESSIBLE | LATHE_PAGE, .build = build_page};
+    lathe_recipe recipe = {.key = "draco-page",
+                           .type = "text/html; charset=utf-8",
+                           .traits = LATHE_COMPRESSIBLE | LATHE_PAGE,
+                           .build = build_page};
     return lathe__respond(request, &recipe);
 }

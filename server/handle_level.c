@@ -37,7 +37,8 @@ static lathe_status build_level(lathe_body *body, void *context, lathe_error *er
     lathe_world_mesh mesh = {0};
     lathe_buffer out = {0};
     lathe_status status = lathe_model_mesh(&mesh, l->entry->model, l->structure, l->level, err);
-    if (!status && l->smooth && (status = lathe_world_mesh_smooth(&mesh, l->smooth)) != LATHE_OK) lathe_world_mesh_free(&mesh);
+    if (!status && l->smooth && (status = lathe_world_mesh_smooth(&mesh, l->smooth)) != LATHE_OK)
+        lathe_world_mesh_free(&mesh);
     if (!status) {
         status = write_mesh(&out, &mesh, l);
         lathe_world_mesh_free(&mesh);
@@ -91,7 +92,8 @@ static enum MHD_Result reply(lathe_request *request, level *l) {
 static bool query_smooth(lathe_request *request, uint32_t *out, enum MHD_Result *result) {
     const char *text = lathe__request_query(request, "smooth");
     if (!text || (lathe__parse_number(text, out) && *out >= 1 && *out <= MOST_SMOOTH)) return true;
-    *result = lathe__respond_problem(request, 400, "smooth must be 1 to %d: how many pieces an edge is cut into", MOST_SMOOTH);
+    *result = lathe__respond_problem(request, 400, "smooth must be 1 to %d: how many pieces an edge is cut into",
+                                     MOST_SMOOTH);
     return false;
 }
 
@@ -103,7 +105,8 @@ enum MHD_Result lathe__handle_level(lathe_request *request) {
         result =
             lathe__respond_problem(request, 404, "a level is named {n}.drc, {n}.glb, {n}.stl or {n}.ply, n in 0..%u",
                                    lathe__entry_levels(l.entry, -1) - 1);
-    else if (query_smooth(request, &l.smooth, &result) && lathe__request_structure(request, l.entry, &l.structure, &result))
+    else if (query_smooth(request, &l.smooth, &result) &&
+             lathe__request_structure(request, l.entry, &l.structure, &result))
         result = reply(request, &l);
     lathe__entry_release(l.entry);
     return result;

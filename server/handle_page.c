@@ -89,6 +89,7 @@ static lathe_status build_extras(lathe_body *body, void *context, lathe_error *e
 }
 
 enum MHD_Result lathe__handle_extras(lathe_request *request) {
-    lathe_recipe recipe = {.key = "extras", .type = "text/javascript; charset=utf-8", .traits = LATHE_COMPRESSIBLE, .build = build_extras};
+    lathe_recipe recipe = {
+        .key = "extras", .type = "text/javascript; charset=utf-8", .traits = LATHE_COMPRESSIBLE, .build = build_extras};
     return lathe__respond(request, &recipe);
 }

@@ -1,4 +1,5 @@
-/* /models/{m}/slices/{k}.png, .../{k}/outline, .../{k}/contour: one slice, drawn from the voxels that the last level has. */
+/* /models/{m}/slices/{k}.png, .../{k}/outline, .../{k}/contour: one slice, drawn from the voxels that the last level
+ * has. */
 #include "centre.h"
 #include "hierarchy.h"
 #include "model_slice.h"
@@ -52,7 +53,8 @@ static lathe_status build_voxels(lathe_body *body, void *context, lathe_error *e
 /* To be released. */
 static lathe_status get(lathe_representation **out, slice *s, const char *what, lathe_build build, lathe_error *err) {
     lathe_recipe recipe = {.type = "application/octet-stream", .entry = s->entry, .build = build, .context = s};
-    snprintf(recipe.key, sizeof recipe.key, "%s:%s:%s:%lld", s->entry->id, s->entry->hash, what, (long long)s->structure);
+    snprintf(recipe.key, sizeof recipe.key, "%s:%s:%s:%lld", s->entry->id, s->entry->hash, what,
+             (long long)s->structure);
     return lathe__cache_get(out, s->request->service->cache, &recipe, LATHE_IDENTITY, err);
 }
 
@@ -125,7 +127,8 @@ static lathe_status write_picture(writing *w) {
     uint8_t *rgba = calloc((size_t)s->frame.width * s->frame.height, 4);
     if (!rgba) return LATHE_ERR_MEMORY;
     lathe__slice_draw(rgba, &s->frame, &w->slices, s->entry->info, s->number);
-    lathe_status status = lathe__png_write(&w->out.bytes, &w->out.size, rgba, s->frame.width, s->frame.height, s->frame.pixel_mm);
+    lathe_status status =
+        lathe__png_write(&w->out.bytes, &w->out.size, rgba, s->frame.width, s->frame.height, s->frame.pixel_mm);
     free(rgba);
     return status;
 }
@@ -151,7 +154,8 @@ static lathe_status write_outline(writing *w) {
         lathe_outline whole, outline;
         status = lathe__slice_outline(&whole, &w->arena, &w->slices, i, s->number);
         outline = whole;
-        if (!status && whole.loop_count && tolerance > 0) status = lathe__simplify_section(&outline, &w->arena, &whole, tolerance);
+        if (!status && whole.loop_count && tolerance > 0)
+            status = lathe__simplify_section(&outline, &w->arena, &whole, tolerance);
         if (!status) status = put_loops(w, &w->slices.structures[i], &outline);
         lathe__arena_reset(&w->arena);
     }
@@ -166,7 +170,8 @@ static lathe_status put_crossings(writing *w, const lathe_ray_contour *c) {
     for (uint32_t i = 0; i < c->count && !status; i++)
         status = put(w, "%s%s", i ? "," : "", c->crossings[i].in_out ? "true" : "false");
     if (!status) status = put(w, "],\"edges\":[");
-    for (uint32_t i = 0; i < c->count && !status; i++) status = put(w, "%s\"%s\"", i ? "," : "", names[c->types[i] % 6]);
+    for (uint32_t i = 0; i < c->count && !status; i++)
+        status = put(w, "%s\"%s\"", i ? "," : "", names[c->types[i] % 6]);
     return status ? status : put(w, "]}");
 }
 
@@ -175,7 +180,8 @@ static lathe_status put_contour(writing *w, const lathe_slice_structure *s, cons
     const lathe_loop *loop = &outline->loops[l];
     lathe_point *points = LATHE_NEW(&w->arena, lathe_point, loop->count), centre;
     if (!points) return LATHE_ERR_MEMORY;
-    for (uint32_t i = 0; i < loop->count; i++) points[i] = outline->points[loop->first + (loop->hole ? loop->count - 1 - i : i)];
+    for (uint32_t i = 0; i < loop->count; i++)
+        points[i] = outline->points[loop->first + (loop->hole ? loop->count - 1 - i : i)];
     lathe_ray_contour contour = {0};
     lathe_status status = lathe__loop_centre(&centre, &w->arena, points, loop->count);
     if (status) return status;
@@ -200,7 +206,8 @@ static lathe_status write_contour(writing *w) {
     for (size_t i = 0; i < w->slices.count && !status; i++) {
         lathe_outline outline;
         status = lathe__slice_outline(&outline, &w->arena, &w->slices, i, s->number);
-        for (uint32_t l = 0; !status && l < outline.loop_count; l++) status = put_contour(w, &w->slices.structures[i], &outline, l);
+        for (uint32_t l = 0; !status && l < outline.loop_count; l++)
+            status = put_contour(w, &w->slices.structures[i], &outline, l);
         lathe__arena_reset(&w->arena);
     }
     return status ? status : put(w, "]}\n");
@@ -225,9 +232,15 @@ static lathe_status build(lathe_body *body, slice *s, lathe_status (*write)(writ
     body->size = w.out.size;
     return LATHE_OK;
 }
-static lathe_status build_picture(lathe_body *body, void *context, lathe_error *err) { return build(body, context, write_picture, err); }
-static lathe_status build_outline(lathe_body *body, void *context, lathe_error *err) { return build(body, context, write_outline, err); }
-static lathe_status build_contour(lathe_body *body, void *context, lathe_error *err) { return build(body, context, write_contour, err); }
+static lathe_status build_picture(lathe_body *body, void *context, lathe_error *err) {
+    return build(body, context, write_picture, err);
+}
+static lathe_status build_outline(lathe_body *body, void *context, lathe_error *err) {
+    return build(body, context, write_outline, err);
+}
+static lathe_status build_contour(lathe_body *body, void *context, lathe_error *err) {
+    return build(body, context, write_contour, err);
+}
 
 typedef enum kind { PICTURE, OUTLINE, CONTOUR } kind;
 
@@ -236,8 +249,8 @@ static enum MHD_Result reply(lathe_request *request, slice *s, kind kind) {
     lathe_recipe recipe = {.type = kind == PICTURE ? "image/png" : "application/json",
                            .traits = kind == PICTURE ? LATHE_RANGES : LATHE_COMPRESSIBLE,
                            .entry = s->entry, .build = builds[kind], .context = s};
-    snprintf(recipe.key, sizeof recipe.key, "%s:%s:slice:%lld:%d:%d:%.17g:%u", s->entry->id, s->entry->hash, (long long)s->structure,
-             s->number, (int)kind, s->tolerance, s->rays);
+    snprintf(recipe.key, sizeof recipe.key, "%s:%s:slice:%lld:%d:%d:%.17g:%u", s->entry->id, s->entry->hash,
+             (long long)s->structure, s->number, (int)kind, s->tolerance, s->rays);
     return lathe__respond(request, &recipe);
 }
 
@@ -257,12 +270,14 @@ static bool parse_length(const char *text, double *out) {
 static bool query(lathe_request *request, slice *s, kind kind, enum MHD_Result *result) {
     const char *tolerance = lathe__request_query(request, "tolerance"), *rays = lathe__request_query(request, "rays");
     if (kind == OUTLINE && tolerance && !parse_length(tolerance, &s->tolerance)) {
-        *result = lathe__respond_problem(request, 400, "tolerance is not a length in mm: digits and at most one point, 0..1000000");
+        *result = lathe__respond_problem(
+            request, 400, "tolerance is not a length in mm: digits and at most one point, 0..1000000");
         return false;
     }
     if (kind != CONTOUR) return true;
     s->rays = DEFAULT_RAYS;
-    if (rays && (!lathe__parse_number(rays, &s->rays) || s->rays < MIN_RAYS || s->rays > MAX_RAYS || s->rays & (s->rays - 1))) {
+    if (rays &&
+        (!lathe__parse_number(rays, &s->rays) || s->rays < MIN_RAYS || s->rays > MAX_RAYS || s->rays & (s->rays - 1))) {
         *result = lathe__respond_problem(request, 400, "rays is not a power of two in %d..%d", MIN_RAYS, MAX_RAYS);
         return false;
     }
@@ -274,11 +289,13 @@ static enum MHD_Result find_slice(lathe_request *request, slice *s, kind kind) {
     lathe_error err = {""};
     lathe_status status = get_frame(s, &err);
     if (status)
-        return lathe__respond_problem(request, status == LATHE_ERR_MEMORY ? 503 : 500, "the model's slices cannot be read: %s", err.text);
+        return lathe__respond_problem(request, status == LATHE_ERR_MEMORY ? 503 : 500,
+                                      "the model's slices cannot be read: %s", err.text);
     const int32_t *low = s->frame.low, *high = s->frame.high;
     if (!lathe__parse_number(request->captures[1], &number) || (int32_t)number < low[2] || (int32_t)number > high[2])
         return lathe__respond_problem(request, 404, "%s has slices %d..%d, counted in the volume along its axis %c",
-                                      s->structure < 0 ? "the model" : "the structure", low[2], high[2], 'x' + s->entry->info->axis);
+                                      s->structure < 0 ? "the model" : "the structure", low[2], high[2],
+                                      'x' + s->entry->info->axis);
     s->number = (int32_t)number;
     return reply(request, s, kind);
 }

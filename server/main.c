@@ -21,7 +21,8 @@ static void print_help(FILE *out) {
           "Exit status: 0 done, 1 bad input or a failed check, 2 wrong usage.\n", out);
 }
 
-/* A file opened later must not become standard input, output or error: closed ones are taken, so that writing to them fails. */
+/* A file opened later must not become standard input, output or error: closed ones are taken, so that writing to
+ * them fails. */
 static void occupy_standard_files(void) {
     for (int fd = open("/dev/null", O_RDONLY); fd >= 0; fd = open("/dev/null", O_RDONLY))
         if (fd > STDERR_FILENO) {

@@ -31,12 +31,13 @@ static json_t *levels_json(const lathe_level_info *levels, uint32_t count) {
     for (uint32_t n = 0; list && n < count; n++) {
         const lathe_level_info *l = &levels[n];
         json_t *level =
-            json_pack("{s:i, s:I, s:I, s:I, s:I, s:I, s:o, s:o, s:o, s:I, s:I, s:o}", "level", (int)n, "rays", (json_int_t)l->rays,
-                      "slices", (json_int_t)l->slices, "vertices", (json_int_t)l->vertices, "triangles",
-                      (json_int_t)l->triangles, "polar_bytes", (json_int_t)l->polar_bytes, "draco_bytes",
+            json_pack("{s:i, s:I, s:I, s:I, s:I, s:I, s:o, s:o, s:o, s:I, s:I, s:o}", "level", (int)n, "rays",
+                      (json_int_t)l->rays, "slices", (json_int_t)l->slices, "vertices", (json_int_t)l->vertices,
+                      "triangles", (json_int_t)l->triangles, "polar_bytes", (json_int_t)l->polar_bytes, "draco_bytes",
                       l->draco_bytes ? json_integer((json_int_t)l->draco_bytes) : json_null(), "error_max_mm",
-                      error_mm(l->error_max_mm), "error_rms_mm", error_mm(l->error_rms_mm), "components", (json_int_t)l->components,
-                      "components_waiting", (json_int_t)l->components_waiting, "waiting_mm3", rounded(l->waiting_mm3, 6));
+                      error_mm(l->error_max_mm), "error_rms_mm", error_mm(l->error_rms_mm), "components",
+                      (json_int_t)l->components, "components_waiting", (json_int_t)l->components_waiting, "waiting_mm3",
+                      rounded(l->waiting_mm3, 6));
         if (!level || json_array_append_new(list, level)) {
             json_decref(list);
             return NULL;
@@ -79,12 +80,12 @@ json_t *lathe__manifest(lathe_entry *entry, bool inlined, int64_t structure) {
     const lathe_model_info *info = entry->info;
     const char axis[2] = {(char)('x' + info->axis), 0};
     const lathe_level_info *levels = structure < 0 ? info->levels : info->structures[structure].levels;
-    json_t *json =
-        json_pack("{s:s, s:o, s:s, s:s, s:s, s:s, s:o, s:o, s:o, s:o}", "id", entry->id, "name",
-                  lathe__json_name(info->name ? info->name : entry->id), "hash", entry->hash, "axis", axis, "boundary",
-                  info->boundary == LATHE_BOUNDARY_EDGE ? "edge" : "iso", "topology", info->keep_topology ? "keep" : "own", "iso", rounded(info->iso, 15), "levels",
-                  levels_json(levels, lathe__entry_levels(entry, structure)), "bounds", bounds_json(entry, structure),
-                  "structures", structures_json(entry, inlined, structure));
+    json_t *json = json_pack("{s:s, s:o, s:s, s:s, s:s, s:s, s:o, s:o, s:o, s:o}", "id", entry->id, "name",
+                             lathe__json_name(info->name ? info->name : entry->id), "hash", entry->hash, "axis", axis,
+                             "boundary", info->boundary == LATHE_BOUNDARY_EDGE ? "edge" : "iso", "topology",
+                             info->keep_topology ? "keep" : "own", "iso", rounded(info->iso, 15), "levels",
+                             levels_json(levels, lathe__entry_levels(entry, structure)), "bounds",
+                             bounds_json(entry, structure), "structures", structures_json(entry, inlined, structure));
     if (json && structure >= 0 &&
         json_object_set_new(json, "structure", lathe__json_name(info->structures[structure].name))) {
         json_decref(json);

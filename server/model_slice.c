@@ -18,8 +18,8 @@ static int feed(void *context, const void *bytes, size_t size) {
 }
 
 /* A decoder that has taken the levels up to `level`, and decoded `packets` of them. */
-static lathe_status run(lathe_decoder **out, const lathe_model *model, int64_t structure, uint32_t level, uint32_t packets,
-                        lathe_error *err) {
+static lathe_status run(lathe_decoder **out, const lathe_model *model, int64_t structure, uint32_t level,
+                        uint32_t packets, lathe_error *err) {
     lathe_decoder *decoder = NULL;
     lathe_status status = lathe_decoder_open(&decoder);
     if (status) return lathe_fail(err, status, "out of memory");
@@ -39,9 +39,12 @@ static lathe_status run(lathe_decoder **out, const lathe_model *model, int64_t s
     return status;
 }
 
-static size_t words_of(const lathe_voxels *v) { return v->bits ? (size_t)v->size[1] * (size_t)v->size[2] * (size_t)v->row_words : 0; }
+static size_t words_of(const lathe_voxels *v) {
+    return v->bits ? (size_t)v->size[1] * (size_t)v->size[2] * (size_t)v->row_words : 0;
+}
 
-lathe_status lathe__slices_decode(uint8_t **bytes, size_t *size, const lathe_model *model, int64_t structure, lathe_error *err) {
+lathe_status lathe__slices_decode(uint8_t **bytes, size_t *size, const lathe_model *model, int64_t structure,
+                                  lathe_error *err) {
     const lathe_model_info *info = lathe_model_describe(model);
     lathe_decoder *decoder;
     lathe_status status = run(&decoder, model, structure, info->level_count, UINT32_MAX, err);
@@ -62,8 +65,11 @@ lathe_status lathe__slices_decode(uint8_t **bytes, size_t *size, const lathe_mod
     lathe_slice_structure *s = (lathe_slice_structure *)(void *)(block + sizeof place);
     for (uint32_t i = 0; i < count && lathe_decoder_voxels(decoder, i, &voxels); i++) {
         size_t own = words_of(&voxels);
-        s[i] = (lathe_slice_structure){.structure = structure < 0 ? i : (uint32_t)structure, .row_words = voxels.row_words,
-                                       .fraction = voxels.fraction, .transform = *lathe_decoder_transform(decoder, i), .words = at};
+        s[i] = (lathe_slice_structure){.structure = structure < 0 ? i : (uint32_t)structure,
+                                       .row_words = voxels.row_words,
+                                       .fraction = voxels.fraction,
+                                       .transform = *lathe_decoder_transform(decoder, i),
+                                       .words = at};
         memcpy(s[i].size, voxels.size, sizeof s[i].size);
         memcpy(s[i].origin, voxels.origin, sizeof s[i].origin);
         if (own) memcpy(block + head + at * sizeof(uint64_t), voxels.bits, own * sizeof(uint64_t));
@@ -140,7 +146,8 @@ static void place_of(double place[2], const lathe_slice_frame *f, double x, doub
 void lathe__slice_place(double world[3], const lathe_slice_frame *f, int32_t slice, double x, double y) {
     double p[2];
     place_of(p, f, x, y);
-    for (int i = 0; i < 3; i++) world[i] = f->matrix[i][0] * p[0] + f->matrix[i][1] * p[1] + f->matrix[i][2] * slice + f->matrix[i][3];
+    for (int i = 0; i < 3; i++)
+        world[i] = f->matrix[i][0] * p[0] + f->matrix[i][1] * p[1] + f->matrix[i][2] * slice + f->matrix[i][3];
 }
 
 /* ---- one slice ---- */
@@ -151,8 +158,8 @@ static const uint64_t *slice_words(const lathe_slices *slices, const lathe_slice
     return slices->words + s->words + (size_t)w * (size_t)s->size[1] * (size_t)s->row_words;
 }
 
-static void draw_structure(uint8_t *rgba, const lathe_slice_frame *f, const lathe_slice_structure *s, const uint64_t *words,
-                           const uint8_t rgb[3]) {
+static void draw_structure(uint8_t *rgba, const lathe_slice_frame *f, const lathe_slice_structure *s,
+                           const uint64_t *words, const uint8_t rgb[3]) {
     for (uint32_t y = 0; y < f->height; y++) {
         double p[2];
         place_of(p, f, 0.5, y + 0.5);
@@ -161,7 +168,9 @@ static void draw_structure(uint8_t *rgba, const lathe_slice_frame *f, const lath
         for (uint32_t x = 0; x < f->width; x++) {
             place_of(p, f, x + 0.5, y + 0.5);
             int32_t u = (int32_t)lround(p[0]) - s->origin[0];
-            if (u < 0 || u >= s->size[0] || !(words[(size_t)v * (size_t)s->row_words + ((uint32_t)u >> 6)] >> (u & 63) & 1)) continue;
+            if (u < 0 || u >= s->size[0] ||
+                !(words[(size_t)v * (size_t)s->row_words + ((uint32_t)u >> 6)] >> (u & 63) & 1))
+                continue;
             uint8_t *pixel = rgba + ((size_t)y * f->width + x) * 4;
             memcpy(pixel, rgb, 3);
             pixel[3] = 255;
@@ -169,8 +178,8 @@ static void draw_structure(uint8_t *rgba, const lathe_slice_frame *f, const lath
     }
 }
 
-void lathe__slice_draw(uint8_t *rgba, const lathe_slice_frame *frame, const lathe_slices *slices, const lathe_model_info *info,
-                       int32_t slice) {
+void lathe__slice_draw(uint8_t *rgba, const lathe_slice_frame *frame, const lathe_slices *slices,
+                       const lathe_model_info *info, int32_t slice) {
     for (size_t i = 0; i < slices->count; i++) {
         const lathe_slice_structure *s = &slices->structures[i];
         const uint64_t *words = slice_words(slices, s, slice);
@@ -178,7 +187,8 @@ void lathe__slice_draw(uint8_t *rgba, const lathe_slice_frame *frame, const lath
     }
 }
 
-lathe_status lathe__slice_outline(lathe_outline *out, lathe_arena *arena, const lathe_slices *slices, size_t index, int32_t slice) {
+lathe_status lathe__slice_outline(lathe_outline *out, lathe_arena *arena, const lathe_slices *slices, size_t index,
+                                  int32_t slice) {
     const lathe_slice_structure *s = &slices->structures[index];
     *out = (lathe_outline){0};
     int32_t *border;
@@ -191,5 +201,6 @@ lathe_status lathe__slice_outline(lathe_outline *out, lathe_arena *arena, const 
 void lathe__slice_point(double world[3], const lathe_slice_structure *s, int32_t slice, lathe_point p) {
     double w = (double)(slice - s->origin[2]) * LATHE_LATTICE_ONE;
     for (int i = 0; i < 3; i++)
-        world[i] = s->transform.m[i][0] * p.x + s->transform.m[i][1] * p.y + s->transform.m[i][2] * w + s->transform.m[i][3];
+        world[i] =
+            s->transform.m[i][0] * p.x + s->transform.m[i][1] * p.y + s->transform.m[i][2] * w + s->transform.m[i][3];
 }

@@ -29,7 +29,8 @@ static void filter_rows(uint8_t *out, const uint8_t *rgba, uint32_t width, uint3
     }
 }
 
-lathe_status lathe__png_write(uint8_t **bytes, size_t *size, const uint8_t *rgba, uint32_t width, uint32_t height, double pixel_mm) {
+lathe_status lathe__png_write(uint8_t **bytes, size_t *size, const uint8_t *rgba, uint32_t width, uint32_t height,
+                              double pixel_mm) {
     static const uint8_t signature[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
     if (!width || !height || width > MAX_SIDE || height > MAX_SIDE) return LATHE_ERR_LIMIT;
     uLong raw = ((uLong)width * 4 + 1) * height;

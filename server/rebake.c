@@ -1,4 +1,5 @@
-/* Bakes a volume again as an archive says it was baked, into memory: what was encoded, to compare with what was decoded. */
+/* Bakes a volume again as an archive says it was baked, into memory: what was encoded, to compare with what was
+ * decoded. */
 #include "rebake.h"
 #include <math.h>
 #include <stdlib.h>
@@ -33,7 +34,8 @@ static lathe_bake_structure *same_structures(const lathe_model_info *info) {
     return list;
 }
 
-lathe_status lathe__rebake(lathe_rebaked *out, const lathe_model_info *info, const lathe_volume *volume, lathe_error *err) {
+lathe_status lathe__rebake(lathe_rebaked *out, const lathe_model_info *info, const lathe_volume *volume,
+                           lathe_error *err) {
     lathe_bake_structure *structures = same_structures(info);
     if (!structures) return LATHE_ERR_MEMORY;
     lathe_bake_options options;

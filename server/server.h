@@ -14,7 +14,8 @@ typedef struct lathe_serve_options {
     /* 0 in any of these: the default, or the environment variable named beside it */
     unsigned max_connections;      /* LATHE_MAX_CONNECTIONS, 1024 */
     unsigned threads;              /* LATHE_THREADS, one for each core */
-    unsigned header_seconds;       /* LATHE_HEADER_SECONDS, 10: from connecting to the end of the first request's headers */
+    unsigned header_seconds;       /* LATHE_HEADER_SECONDS, 10: from connecting to the end of the first request's
+                                    * headers */
     unsigned idle_seconds;         /* LATHE_IDLE_SECONDS, 30: from a reply to the end of the next request's headers */
     unsigned drain_seconds;        /* LATHE_DRAIN_SECONDS, 10: what a running reply gets after SIGTERM */
     size_t cache_megabytes;        /* LATHE_CACHE_MB, 256: built representations kept in memory */
@@ -23,6 +24,7 @@ typedef struct lathe_serve_options {
 /* 127.0.0.1:8080 and zeros. */
 void lathe_serve_defaults(lathe_serve_options *options);
 /* Serves until SIGINT or SIGTERM, then drains and returns 0; a second signal ends at once. Prints `listening on
- * http://ADDR:PORT` on stdout when ready, problems and the access log on stderr. 1: a path or the port cannot be used. */
+ * http://ADDR:PORT` on stdout when ready, problems and the access log on stderr. 1: a path or the port cannot be
+ * used. */
 int lathe_serve(const lathe_serve_options *options);
 #endif

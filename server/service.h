@@ -52,7 +52,13 @@ bool lathe__entry_bounds(lathe_entry *entry, int64_t structure, double low[3], d
 typedef enum lathe_encoding { LATHE_IDENTITY, LATHE_GZIP, LATHE_BROTLI, LATHE_NONE_ACCEPTABLE } lathe_encoding;
 enum lathe_traits { LATHE_COMPRESSIBLE = 1, LATHE_PAGE = 2, LATHE_RANGES = 4 };
 /* The bytes: either owned (malloc) or part of an entry's mapped archive. */
-typedef struct lathe_body { atomic_int references; const uint8_t *bytes; size_t size; uint8_t *owned; lathe_entry *entry; } lathe_body;
+typedef struct lathe_body {
+    atomic_int references;
+    const uint8_t *bytes;
+    size_t size;
+    uint8_t *owned;
+    lathe_entry *entry;
+} lathe_body;
 typedef lathe_status (*lathe_build)(lathe_body *body, void *context, lathe_error *err);
 typedef struct lathe_recipe {
     char key[192];                 /* names the bytes: model, its hash, what of it */
@@ -140,7 +146,8 @@ typedef struct lathe_request {
     int64_t started;
 } lathe_request;
 void *lathe__request_begin(void *service, const char *target, struct MHD_Connection *connection);
-void lathe__request_end(void *service, struct MHD_Connection *connection, void **request, enum MHD_RequestTerminationCode code);
+void lathe__request_end(void *service, struct MHD_Connection *connection, void **request,
+                        enum MHD_RequestTerminationCode code);
 /* What HTTP leaves to be misunderstood between us and a proxy, and what is malformed: 0, or the status and *why. */
 unsigned lathe__request_vet(lathe_request *request, const char *version, const char **why);
 /* Cuts the target into decoded segments and query parameters: 0 or the status and *why. */
@@ -151,7 +158,8 @@ bool lathe__parse_number(const char *text, uint32_t *number);                   
 /* The model of captures[0]; NULL: replied (*result). Checks ?v= too. */
 lathe_entry *lathe__request_entry(lathe_request *request, enum MHD_Result *result);
 /* ?structure=: *structure is an index or -1 for all; false: replied. */
-bool lathe__request_structure(lathe_request *request, const lathe_entry *entry, int64_t *structure, enum MHD_Result *result);
+bool lathe__request_structure(lathe_request *request, const lathe_entry *entry, int64_t *structure,
+                              enum MHD_Result *result);
 /* The levels a structure, or the model (-1), has. */
 uint32_t lathe__entry_levels(const lathe_entry *entry, int64_t structure);
 
@@ -187,8 +195,8 @@ enum MHD_Result lathe__handle_slice_contour(lathe_request *request);
 enum MHD_Result lathe__handle_health(lathe_request *request);
 
 /* ---- manifest.c ---- */
-/* The manifest of a model. inlined: as the page carries it, without the structures' levels; structure: only this one, or -1.
- * NULL: out of memory. */
+/* The manifest of a model. inlined: as the page carries it, without the structures' levels; structure: only this
+ * one, or -1. NULL: out of memory. */
 json_t *lathe__manifest(lathe_entry *entry, bool inlined, int64_t structure);
 json_t *lathe__json_name(const char *text);     /* a string, also of bytes that are not UTF-8 */
 /* Compact, and safe inside a <script>: no '<' in it. */

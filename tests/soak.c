@@ -1,4 +1,5 @@
-/* soak PAIRS [FIRST [SEED]]: the guarantees on random pairs of slices, exact and coarse; ends like a test, "N passed, M failed". */
+/* soak PAIRS [FIRST [SEED]]: the guarantees on random pairs of slices, exact and coarse; ends like a test,
+ * "N passed, M failed". */
 #include "slice_pairs.h"
 #include <inttypes.h>
 #include <time.h>
@@ -15,8 +16,8 @@ int main(int argc, char **argv) {
             if (!*fault) continue;
             total++;
             if (failed[p.kind][exact]++ < 5)
-                printf("pair %" PRIu64 " (%s, size %d, fraction %d, coarseness %u): the surface %s\n", i, pair_kind_name[p.kind], p.size,
-                       p.fraction, exact ? 0 : (unsigned)p.coarseness, fault);
+                printf("pair %" PRIu64 " (%s, size %d, fraction %d, coarseness %u): the surface %s\n", i,
+                       pair_kind_name[p.kind], p.size, p.fraction, exact ? 0 : (unsigned)p.coarseness, fault);
         }
         lathe__mask_free(&p.mask);
         if (i % 1024 || time(NULL) - told < 60) continue;
@@ -25,8 +26,10 @@ int main(int argc, char **argv) {
         fflush(stdout);
     }
     for (int k = 0; k < PAIR_KINDS; k++)
-        if (failed[k][0] + failed[k][1]) printf("%s: %" PRIu64 " coarse, %" PRIu64 " exact\n", pair_kind_name[k], failed[k][0], failed[k][1]);
-    printf("%" PRIu64 " pairs in %ld s\n%" PRIu64 " passed, %" PRIu64 " failed\n", pairs, (long)(time(NULL) - start), 2 * pairs - total, total);
+        if (failed[k][0] + failed[k][1])
+            printf("%s: %" PRIu64 " coarse, %" PRIu64 " exact\n", pair_kind_name[k], failed[k][0], failed[k][1]);
+    printf("%" PRIu64 " pairs in %ld s\n%" PRIu64 " passed, %" PRIu64 " failed\n", pairs, (long)(time(NULL) - start),
+           2 * pairs - total, total);
     lathe__arena_free(&arena[0]);
     lathe__arena_free(&arena[1]);
     return total != 0;

@@ -172,6 +172,18 @@ exits 1 reconstruct "$here/none.json" -o "$here/no.stl"
 echo '{"sections":[{"z":0,"polygons":[[[0,0],[9,9],[9,0],[0,9]]]}]}' >"$here/bow.json"
 exits 1 reconstruct "$here/bow.json" -o "$here/no.stl"; says "section 0, polygon 0"
 
+# ---- drawings: a star-shaped contour has one FOR edge for each ray ----
+svg=$here/section.svg
+exits 0 draw $set --slice 0 --rays 32 -o "$svg"; ok "title" grep -q "<title>y_with_hole, section 0 at 0 mm, loop 0 of 2, 32 rays" "$svg"
+ok "32 FOR edges" test "$(grep -c 'class="for"' "$svg")" = 32
+exits 0 draw $set --slice 1 --loop 1 -o "$svg"; ok "hole" grep -q "section 1 at 3 mm, hole, loop 1 of 2, 16 rays" "$svg"
+exits 0 draw "$here/ball.json" --iso 128 --slice 8 -o "$svg"; ok "slice" grep -q "<title>ball, slice 8 across z, loop 0 of 1, 16 rays" "$svg"
+ok "16 FOR edges" test "$(grep -c 'class="for"' "$svg")" = 16
+exits 1 draw $set --slice 99 -o "$here/no.svg"; says "the set has sections 0 to"
+exits 1 draw $set --slice 0 --loop 2 -o "$here/no.svg"; says "section 0 at 0 mm has 2 loops"
+exits 2 draw $set --slice 0 --iso 1 -o "$here/no.svg"; says "are for volumes"
+exits 1 draw "$here/bow.json" --slice 0 -o "$here/no.svg"; says "section 0, polygon 0"
+
 # ---- bench and hash ----
 exits 0 hash "$here/ball.lathe"; prints "^[0-9a-f]\{16\}$"
 hash=$(cat "$here/out")

@@ -2,6 +2,7 @@
 #include "../core/mesh.h"
 #include "../core/mesh_intersect.h"
 #include "check.h"
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -214,7 +215,8 @@ static bool brute_meet(const lathe_mesh *mesh, uint32_t first, uint32_t second) 
                        minus(q[(l + 2) % 3], a));
 }
 
-/* The same mesh at several scales: within 16 voxels, beyond, and at the ends of int32, where doubles no longer suffice. */
+/* The same mesh at several scales: within 16 voxels, beyond, and at the ends of int32, where doubles no longer
+ * suffice. */
 static void test_intersections(void) {
     static const int64_t scales[4] = {1, 65536 * 5 + 1, 1 << 27, (1 << 29) - 1};
     uint64_t total = 0, wrong = 0;
@@ -241,7 +243,132 @@ static void test_intersections(void) {
     CHECK(total > 10000);
 }
 
-/* Signs of nearly flat volumes at the ends of the range, known from the construction: d = c + e in the plane, then one off. */
+/* ---- large fans ---- */
+
+static bool is_flat(const lathe_mesh *mesh, uint32_t k) {
+    const uint32_t *t = mesh->triangles[k];
+    return lathe__triangle_degenerate(mesh->lattice[t[0]], mesh->lattice[t[1]], mesh->lattice[t[2]]);
+}
+
+static uint64_t brute_count(const lathe_mesh *mesh, bool axes) {
+    uint64_t found = 0;
+    for (uint32_t a = 0; a < mesh->triangle_count; a++)
+        for (uint32_t b = a + 1; !is_flat(mesh, a) && b < mesh->triangle_count; b++)
+            found += axes ? brute_meet(mesh, a, b) : !is_flat(mesh, b) && lathe__triangles_meet(mesh, a, b);
+    return found;
+}
+
+/* Few places, so that all that can coincide does: fans whose triangles overlap, apexes at one place, other triangles
+ * through them. */
+static void test_random_fans(void) {
+    uint64_t total = 0, wrong = 0;
+    for (int round = 0; round < 250; round++) {
+        int32_t lattice[40][3], large[40][3];
+        uint32_t triangles[170][3], count = 0, span = 2 + chance(6), apexes = 1 + chance(2), flat = chance(3);
+        for (uint32_t k = 0; k < 40; k++)
+            for (int i = 0; i < 3; i++) lattice[k][i] = i == 2 && !flat ? 0 : (int32_t)chance(i == 2 ? flat : span);
+        for (uint32_t a = 0; a < apexes; a++)
+            for (uint32_t k = 0, n = 66 + chance(10); k < n; k++) {
+                uint32_t *t = triangles[count++], turn = chance(3);
+                t[turn] = a;
+                t[(turn + 1) % 3] = 2 + chance(38);
+                t[(turn + 2) % 3] = chance(3) ? 2 + chance(38) : t[(turn + 1) % 3] ^ 1;
+            }
+        while (count < 160) {
+            for (int i = 0; i < 3; i++) triangles[count][i] = chance(40);
+            count++;
+        }
+        lathe_mesh mesh = {40, count, lattice, triangles};
+        uint64_t expected = brute_count(&mesh, true), found = 0;
+        total += expected;
+        mesh.lattice = large;
+        for (int k = 0; k < 3; k++) {
+            int64_t scale = k == 0 ? 1 : k == 1 ? 65536 * 3 + 1 : (1 << 28) - 1;
+            for (uint32_t v = 0; v < 40; v++)
+                for (int i = 0; i < 3; i++) large[v][i] = (int32_t)((lattice[v][i] - 3) * scale);
+            wrong += lathe__mesh_intersections(&found, &mesh) != LATHE_OK || found != expected;
+        }
+    }
+    CHECK_EQ(wrong, 0);
+    CHECK(total > 100000);
+}
+
+typedef struct cone_mesh {
+    lathe_mesh mesh;
+    uint32_t n;
+} cone_mesh;
+
+/* Fans from several apexes to one ring each, or to the same one; the ring is a flower with petals, tilted. */
+static cone_mesh make_cones(uint32_t n, int cones, const double apex[][3], bool one_ring, int petals, double tilt) {
+    uint32_t rings = one_ring ? 1 : (uint32_t)cones;
+    cone_mesh c = {{n * rings + (uint32_t)cones, n * (uint32_t)cones, NULL, NULL}, n};
+    c.mesh.lattice = calloc(c.mesh.vertex_count, sizeof *c.mesh.lattice);
+    c.mesh.triangles = calloc(c.mesh.triangle_count, sizeof *c.mesh.triangles);
+    if (!c.mesh.lattice || !c.mesh.triangles) abort();
+    for (uint32_t r = 0; r < rings; r++)
+        for (uint32_t k = 0; k < n; k++) {
+            double a = 2 * 3.14159265358979323846 * k / n, size = 4e8 * (1 + 0.4 * sin(petals * a)) / (1 + r);
+            int32_t *v = c.mesh.lattice[r * n + k];
+            v[0] = (int32_t)(size * cos(a));
+            v[1] = (int32_t)(size * sin(a));
+            v[2] = (int32_t)(tilt * v[0] + tilt / 3 * v[1]) + (int32_t)r * 1000;
+        }
+    for (int a = 0; a < cones; a++) {
+        uint32_t at = n * rings + (uint32_t)a, ring = one_ring ? 0 : (uint32_t)a * n;
+        for (int i = 0; i < 3; i++) c.mesh.lattice[at][i] = (int32_t)apex[a][i];
+        for (uint32_t k = 0; k < n; k++) {
+            uint32_t *t = c.mesh.triangles[(uint32_t)a * n + k], after = ring + (k + 1) % n;
+            t[0] = at;
+            t[1 + a % 2] = ring + k;
+            t[2 - a % 2] = after;
+        }
+    }
+    return c;
+}
+
+static void free_cones(cone_mesh *c) {
+    free(c->mesh.lattice);
+    free(c->mesh.triangles);
+}
+
+/* As all pairs find it: apexes above, below, in the ring's plane, on it, at one place; beside the axis, so that cones
+ * cross themselves and each other. */
+static void test_cones(void) {
+    static const double apexes[][3][3] = {{{0, 0, 3e8}, {0, 0, -3e8}, {0, 0, 1e8}},
+                                          {{0, 0, 3e8}, {0, 0, 0}, {3e8, 1e8, 0}},
+                                          {{0, 0, 2e9}, {1e5, 7, 2e9}, {0, 0, 2e9}},
+                                          {{7e8, 2e8, 1e5}, {7e8, -2e8, -1e5}, {4e8, 0, 0}},
+                                          {{2e8, 0, 0}, {-2e8, 0, 0}, {0, 5e7, 0}}};
+    uint64_t total = 0;
+    for (int k = 0; k < 40; k++) {
+        cone_mesh c = make_cones(70 + chance(300), 1 + k % 3, apexes[k % 5], k & 8, (int)chance(6), k & 16 ? 0.3 : 0);
+        uint64_t found = 0, expected = brute_count(&c.mesh, false);
+        CHECK_EQ(lathe__mesh_intersections(&found, &c.mesh), LATHE_OK);
+        CHECK_EQ(found, expected);
+        total += expected;
+        free_cones(&c);
+    }
+    CHECK(total > 1000);
+}
+
+/* A double cone of 200,000 triangles, and one whose apexes are both below and above: known by construction, and within
+ * seconds only if not every pair is looked at (2 * 10^10 of them: minutes). */
+static void test_huge_fan(void) {
+    static const double outside[2][3] = {{0, 0, 6e8}, {1e7, 3e7, -2e8}}, same[2][3] = {{0, 0, 6e8}, {0, 0, 2e8}};
+    for (int petals = 0; petals < 6; petals += 5)
+        for (int k = 0; k < 2; k++) {
+            cone_mesh c = make_cones(100000, 2, k ? same : outside, true, petals, k ? 0 : 0.25);
+            lathe_mesh_report r;
+            memset(&r, 0, sizeof r);
+            CHECK_EQ(lathe__mesh_check(&r, &c.mesh, true), LATHE_OK);
+            CHECK_EQ(faults(&r), 0);
+            CHECK_EQ(r.euler, 2);
+            free_cones(&c);
+        }
+}
+
+/* Signs of nearly flat volumes at the ends of the range, known from the construction: d = c + e in the plane, then
+ * one off. */
 static void test_orientation(void) {
     int wrong = 0;
     for (int round = 0; round < 100000; round++) {
@@ -270,5 +397,8 @@ int main(void) {
     test_world();
     test_orientation();
     test_intersections();
+    test_random_fans();
+    test_cones();
+    test_huge_fan();
     return check_end();
 }

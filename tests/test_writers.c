@@ -146,7 +146,22 @@ static void test_glb(void) {
     CHECK(strstr(text, "\"min\":[95.25,-35.0999985,2]") != NULL);
     CHECK(strstr(text, "\"baseColorFactor\":[1,0,0.2158605") != NULL); /* sRGB 128 is 0.2158605 */
     CHECK(strstr(text, "\"generator\":\"Lathe\"") != NULL);
+    const char *first = strstr(text, "\"extras\":{\"structure\":0}");
+    CHECK(first != NULL && strstr(first, "\"extras\":{\"structure\":1}") != NULL);
     free(text);
+    free(m.data);
+    m = (memory){0};
+    /* The first structure shows nothing yet: the only mesh says that it is the second one. */
+    struct lathe_world_part parts[2] = {mesh.parts[0], mesh.parts[1]};
+    lathe_world_mesh second = mesh;
+    parts[0].triangle_count = 0;
+    parts[1].first_triangle = 0;
+    second.parts = parts;
+    second.triangle_count = 8;
+    second.indices += 24;
+    CHECK_EQ(lathe_write_glb(&second, &options, take, &m), LATHE_OK);
+    text = (char *)m.data + 20;
+    CHECK(strstr(text, "\"extras\":{\"structure\":1}") != NULL && strstr(text, "\"structure\":0") == NULL);
     free(m.data);
     m = (memory){0};
     lathe_world_mesh bare = mesh;

@@ -11,7 +11,8 @@ static bool is_edge(const lathe_half_edges *e, uint32_t corner, uint32_t a, uint
     return t[corner % 3] == a && t[(corner + 1) % 3] == b;
 }
 
-lathe_status lathe__half_edges_build(lathe_half_edges *out, lathe_arena *arena, const uint32_t (*triangles)[3], uint32_t count) {
+lathe_status lathe__half_edges_build(lathe_half_edges *out, lathe_arena *arena, const uint32_t (*triangles)[3],
+                                     uint32_t count) {
     if (count > 1u << 28) return LATHE_ERR_LIMIT;
     uint32_t size = 16;
     while (size < count * 6) size *= 2;
@@ -40,7 +41,8 @@ lathe_status lathe__find_adjacency(uint32_t (*adt)[3], const lathe_mesh *mesh) {
     for (uint32_t t = 0; t < mesh->triangle_count; t++)
         for (int k = 0; k < 3; k++)
             if (mesh->triangles[t][k] >= mesh->vertex_count) return LATHE_ERR_FORMAT;
-    lathe_status status = lathe__half_edges_build(&edges, &arena, (const uint32_t(*)[3])mesh->triangles, mesh->triangle_count);
+    lathe_status status =
+        lathe__half_edges_build(&edges, &arena, (const uint32_t(*)[3])mesh->triangles, mesh->triangle_count);
     if (!status && edges.repeated) status = LATHE_ERR_FORMAT;
     for (uint32_t t = 0; !status && t < mesh->triangle_count; t++)
         for (int k = 0; k < 3; k++) {

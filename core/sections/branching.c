@@ -99,8 +99,8 @@ static uint32_t ring_between(const exterior *x, uint32_t *ring, uint32_t s, uint
     return n;
 }
 
-/* A third polygon that overlaps the ring, or is cut by the edge between the pair. It may be in F already, by another side: the middle
- * one of three in a row [P figure 9]. */
+/* A third polygon that overlaps the ring, or is cut by the edge between the pair. It may be in F already, by another
+ * side: the middle one of three in a row [P figure 9]. */
 static uint32_t find_island(const exterior *x, const uint32_t *ring, uint32_t n, const uint32_t pair[2]) {
     const lathe_many *m = x->many;
     lathe_range box = lathe__range_of(m->at[ring[0]], m->at[ring[0]]);
@@ -198,7 +198,8 @@ static lathe_status hull_nodes(exterior *x, uint32_t **out, uint32_t *count) {
     return LATHE_OK;
 }
 
-lathe_status lathe__exterior_polygon(uint32_t **nodes, uint32_t *count, bool *taken, lathe_arena *arena, const lathe_many *many) {
+lathe_status lathe__exterior_polygon(uint32_t **nodes, uint32_t *count, bool *taken, lathe_arena *arena,
+                                     const lathe_many *many) {
     uint32_t total = many->first[many->count], *corner, corners, start = 0;
     exterior x = {.many = many, .arena = arena, .taken = taken, .of = LATHE_NEW(arena, uint32_t, total + 1),
                   .nodes = LATHE_NEW(arena, uint32_t, total + 2), .capacity = total + 1, .left = 4 * many->count + 16};
@@ -256,7 +257,8 @@ static lathe_status walk(interior *in, uint32_t start, uint32_t *ring, uint32_t 
     return LATHE_OK;
 }
 
-static lathe_status close_ring(lathe_triangles *list, lathe_arena *arena, const interior *in, const uint32_t *ring, uint32_t count) {
+static lathe_status close_ring(lathe_triangles *list, lathe_arena *arena, const interior *in, const uint32_t *ring,
+                               uint32_t count) {
     const lathe_many *m = in->x.many;
     uint32_t total = m->first[m->count], used = count;
     lathe_polygon polygon = {.at = m->at, .ring_count = 1, .nodes = LATHE_NEW(arena, uint32_t, (size_t)count + total),
@@ -272,16 +274,19 @@ static lathe_status close_ring(lathe_triangles *list, lathe_arena *arena, const 
     return lathe__close_with_islands(list, arena, &polygon);
 }
 
-lathe_status lathe__close_interior(lathe_triangles *list, uint32_t *rings, lathe_arena *arena, const lathe_many *many, const uint32_t *nodes,
-                                   uint32_t count, const bool *taken) {
+lathe_status lathe__close_interior(lathe_triangles *list, uint32_t *rings, lathe_arena *arena, const lathe_many *many,
+                                   const uint32_t *nodes, uint32_t count, const bool *taken) {
     uint32_t total = many->first[many->count], limit = 2 * total + 2, *ring = LATHE_NEW(arena, uint32_t, limit), n;
-    interior in = {.x = {.many = many, .of = LATHE_NEW(arena, uint32_t, total + 1), .taken = LATHE_NEW(arena, bool, many->count)},
-                   .leave = LATHE_NEW(arena, uint32_t, total + 1), .along = LATHE_NEW(arena, bool, total + 1),
-                   .done = LATHE_NEW(arena, bool, total + 1)};
+    interior in = {
+        .x = {.many = many, .of = LATHE_NEW(arena, uint32_t, total + 1), .taken = LATHE_NEW(arena, bool, many->count)},
+        .leave = LATHE_NEW(arena, uint32_t, total + 1),
+        .along = LATHE_NEW(arena, bool, total + 1),
+        .done = LATHE_NEW(arena, bool, total + 1)};
     if (!ring || !in.x.of || !in.x.taken || !in.leave || !in.along || !in.done) return LATHE_ERR_MEMORY;
     for (uint32_t k = 0; k < many->count; k++) {
         in.x.taken[k] = taken[k];
-        for (uint32_t v = many->first[k]; v < many->first[k + 1]; v++) in.x.of[v] = k, in.leave[v] = NONE, in.along[v] = in.done[v] = false;
+        for (uint32_t v = many->first[k]; v < many->first[k + 1]; v++)
+            in.x.of[v] = k, in.leave[v] = NONE, in.along[v] = in.done[v] = false;
     }
     for (uint32_t i = 0; i < count; i++) {
         uint32_t a = nodes[i], b = nodes[i + 1 < count ? i + 1 : 0];

@@ -62,7 +62,8 @@ static uint32_t find_blocker(const ears *e, uint32_t place) {
     lathe__range_add(&box, n.x, n.y);
     for (uint32_t i = e->next[e->next[place]]; i != e->prev[place]; i = e->next[i]) {
         lathe_point r = e->at[i];
-        if (r.x < box.x0 || r.x > box.x1 || r.y < box.y0 || r.y > box.y1 || equal(r, p) || equal(r, q) || equal(r, n)) continue;
+        if (r.x < box.x0 || r.x > box.x1 || r.y < box.y0 || r.y > box.y1 || equal(r, p) || equal(r, q) || equal(r, n))
+            continue;
         if (lathe__orient(p, q, r) >= 0 && lathe__orient(q, n, r) >= 0 && lathe__orient(n, p, r) >= 0) return i;
     }
     return VALID;
@@ -89,15 +90,17 @@ static uint32_t cheapest(ears *e, uint32_t start) {
 static lathe_status triangulate(lathe_triangles *list, lathe_arena *arena, const lathe_polygon *polygon) {
     uint32_t(*t)[3], *neighbour, count;
     lathe_status status = lathe__triangulate(&t, &neighbour, &count, arena, polygon);
-    for (uint32_t i = 0; !status && i < count; i++) status = lathe__add_triangle(list, arena, t[i][0], t[i][1], t[i][2]);
+    for (uint32_t i = 0; !status && i < count; i++)
+        status = lathe__add_triangle(list, arena, t[i][0], t[i][1], t[i][2]);
     return status;
 }
 
-lathe_status lathe__close_polygon(lathe_triangles *list, lathe_arena *arena, const lathe_point *at, const uint32_t *nodes, uint32_t count) {
+lathe_status lathe__close_polygon(lathe_triangles *list, lathe_arena *arena, const lathe_point *at,
+                                  const uint32_t *nodes, uint32_t count) {
     if (count < 3) return LATHE_ERR_RANGE;
     uint32_t left = count, start = 0, *rest = LATHE_NEW(arena, uint32_t, count);
-    ears e = {LATHE_NEW(arena, lathe_point, count), LATHE_NEW(arena, uint32_t, count), LATHE_NEW(arena, uint32_t, count),
-              LATHE_NEW(arena, uint32_t, count), LATHE_NEW(arena, double, count)};
+    ears e = {LATHE_NEW(arena, lathe_point, count), LATHE_NEW(arena, uint32_t, count),
+              LATHE_NEW(arena, uint32_t, count), LATHE_NEW(arena, uint32_t, count), LATHE_NEW(arena, double, count)};
     if (!rest || !e.at || !e.next || !e.prev || !e.blocker || !e.cost) return LATHE_ERR_MEMORY;
     for (uint32_t i = 0; i < count; i++) {
         e.at[i] = at[nodes[i]];
@@ -148,7 +151,9 @@ static int compare_bridges(const void *a, const void *b) {
     return (p->to > q->to) - (p->to < q->to);
 }
 
-static lathe_point corner(const region *r, uint32_t ring, uint32_t place) { return r->at[r->ring[ring][place % r->count[ring]]]; }
+static lathe_point corner(const region *r, uint32_t ring, uint32_t place) {
+    return r->at[r->ring[ring][place % r->count[ring]]];
+}
 
 /* Does the way from a place to a point start inside the region? */
 static bool in_cone(const region *r, uint32_t ring, uint32_t place, lathe_point to) {
@@ -171,7 +176,8 @@ static bool is_free(const region *r, const bridge *b) {
 }
 
 static bool pair_crosses(const region *r, const bridge *a, const bridge *b) {
-    lathe_point s[4] = {corner(r, 0, a->from), corner(r, a->ring, a->to), corner(r, 0, b->from), corner(r, b->ring, b->to)};
+    lathe_point s[4] = {corner(r, 0, a->from), corner(r, a->ring, a->to), corner(r, 0, b->from),
+                        corner(r, b->ring, b->to)};
     return equal(s[0], s[2]) || equal(s[1], s[3]) || lathe__edges_meet(s[0], s[1], s[2], s[3]);
 }
 
@@ -189,7 +195,8 @@ static lathe_status best_pair(bridge pair[2], bool *found, lathe_arena *arena, c
                 all[n++] = (bridge){length_of(corner(r, 0, i), corner(r, k, j)), i, k, j, false};
     qsort(all, n, sizeof *all, compare_bridges);
     double best = INFINITY, shortest = -1;
-    for (size_t j = 0, tests = 0; j < n && tests < MOST_TESTS && (shortest < 0 || all[j].length + shortest < best); j++, tests++) {
+    for (size_t j = 0, tests = 0; j < n && tests < MOST_TESTS && (shortest < 0 || all[j].length + shortest < best);
+         j++, tests++) {
         all[j].free = is_free(r, &all[j]);
         if (!all[j].free) continue;
         if (shortest < 0) shortest = all[j].length;
@@ -215,7 +222,10 @@ static uint32_t copy_chain(uint32_t *out, uint32_t used, const region *r, uint32
 
 /* The polygon from bridge a on around to bridge b, back along the island; with the islands that lie in it. */
 static lathe_status split(region *out, lathe_arena *arena, const region *r, const bridge *a, const bridge *b) {
-    *out = (region){.at = r->at, .ring = LATHE_NEW(arena, uint32_t *, r->rings), .count = LATHE_NEW(arena, uint32_t, r->rings), .rings = 1};
+    *out = (region){.at = r->at,
+                    .ring = LATHE_NEW(arena, uint32_t *, r->rings),
+                    .count = LATHE_NEW(arena, uint32_t, r->rings),
+                    .rings = 1};
     uint32_t *nodes = LATHE_NEW(arena, uint32_t, r->count[0] + r->count[a->ring] + 2);
     if (!out->ring || !out->count || !nodes) return LATHE_ERR_MEMORY;
     uint32_t n = copy_chain(nodes, 0, r, 0, a->from, b->from);

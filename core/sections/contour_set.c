@@ -33,7 +33,8 @@ double lathe__loop_area2(const lathe_outline *outline, uint32_t loop) {
     return sum;
 }
 
-lathe_status lathe__find_meeting_edges(bool *found, uint32_t edge[2], lathe_arena *arena, const lathe_outline *o, uint64_t *tests) {
+lathe_status lathe__find_meeting_edges(bool *found, uint32_t edge[2], lathe_arena *arena, const lathe_outline *o,
+                                       uint64_t *tests) {
     *found = false;
     if (!o->point_count) return LATHE_OK;
     uint32_t n = o->point_count, *next = LATHE_NEW(arena, uint32_t, n);
@@ -57,7 +58,8 @@ lathe_status lathe__find_meeting_edges(bool *found, uint32_t edge[2], lathe_aren
             for (uint32_t k = i + 1; k < grid.first[c + 1]; k++) {
                 uint32_t b = grid.entry[k];
                 const lathe_range *r = &ranges[a], *s = &ranges[b];
-                if (r->x0 > s->x1 || r->x1 < s->x0 || r->y0 > s->y1 || r->y1 < s->y0 || next[a] == b || next[b] == a) continue;
+                if (r->x0 > s->x1 || r->x1 < s->x0 || r->y0 > s->y1 || r->y1 < s->y0 || next[a] == b || next[b] == a)
+                    continue;
                 if (!lathe__segments_meet(o->points, a, next[a], b, next[b])) continue;
                 edge[0] = a;
                 edge[1] = b;
@@ -87,21 +89,26 @@ static lathe_status check_counts(const building *b) {
     const lathe_raw_set *raw = b->raw;
     if (!raw->section_count) return lathe_fail(b->err, LATHE_ERR_FORMAT, "there is no section");
     if (!raw->polygon_count) return lathe_fail(b->err, LATHE_ERR_FORMAT, "there is no polygon");
-    if (raw->section_count > LATHE_SET_SECTIONS) return lathe_fail(b->err, LATHE_ERR_LIMIT, "more than %d sections", LATHE_SET_SECTIONS);
-    if (raw->point_count > LATHE_SET_POINTS) return lathe_fail(b->err, LATHE_ERR_LIMIT, "more than %d points", LATHE_SET_POINTS);
+    if (raw->section_count > LATHE_SET_SECTIONS)
+        return lathe_fail(b->err, LATHE_ERR_LIMIT, "more than %d sections", LATHE_SET_SECTIONS);
+    if (raw->point_count > LATHE_SET_POINTS)
+        return lathe_fail(b->err, LATHE_ERR_LIMIT, "more than %d points", LATHE_SET_POINTS);
     for (uint32_t s = 0; s < raw->section_count; s++) {
         const lathe_raw_section *section = &raw->sections[s];
         uint64_t points = 0;
-        if (!sane(section->z)) return lathe_fail(b->err, LATHE_ERR_RANGE, "section %u: z is not a height within 1e9 mm", s);
+        if (!sane(section->z))
+            return lathe_fail(b->err, LATHE_ERR_RANGE, "section %u: z is not a height within 1e9 mm", s);
         if (section->count > LATHE_SET_POLYGONS)
             return lathe_fail(b->err, LATHE_ERR_LIMIT, "section %u: more than %d polygons", s, LATHE_SET_POLYGONS);
         for (uint32_t k = 0; k < section->count; k++) {
             const lathe_raw_polygon *p = &raw->polygons[section->first + k];
             points += p->count;
-            if (p->count < 3) return lathe_fail(b->err, LATHE_ERR_FORMAT, "section %u, polygon %u: fewer than 3 points", s, k);
+            if (p->count < 3)
+                return lathe_fail(b->err, LATHE_ERR_FORMAT, "section %u, polygon %u: fewer than 3 points", s, k);
             for (uint32_t i = 0; i < p->count; i++)
                 if (!sane(raw->points[p->first + i][0]) || !sane(raw->points[p->first + i][1]))
-                    return lathe_fail(b->err, LATHE_ERR_RANGE, "section %u, polygon %u, point %u: not a position within 1e9 mm", s, k, i);
+                    return lathe_fail(b->err, LATHE_ERR_RANGE,
+                                      "section %u, polygon %u, point %u: not a position within 1e9 mm", s, k, i);
         }
         if (points > LATHE_SET_SECTION_POINTS)
             return lathe_fail(b->err, LATHE_ERR_LIMIT, "section %u: more than %d points", s, LATHE_SET_SECTION_POINTS);
@@ -152,7 +159,8 @@ static lathe_status sort_sections(building *b) {
     for (uint32_t i = 0; i < n; i++) {
         b->set.sections[i] = (lathe_section){.height = to_lattice(b, b->raw->sections[b->order[i]].z, 2)};
         if (i && b->set.sections[i].height <= b->set.sections[i - 1].height)
-            return lathe_fail(b->err, LATHE_ERR_FORMAT, "sections %u and %u are at one height", b->order[i - 1], b->order[i]);
+            return lathe_fail(b->err, LATHE_ERR_FORMAT, "sections %u and %u are at one height", b->order[i - 1],
+                              b->order[i]);
     }
     return LATHE_OK;
 }
@@ -182,8 +190,10 @@ static uint32_t clean_polygon(building *b, lathe_point *p, uint32_t n) {
         /* Turned by one, so that the ends are looked at as well. */
         if (n < 3) break;
         lathe_point a = p[n - 2], v = p[n - 1], q = p[0], s = p[1];
-        int64_t last = lathe__orient(a, v, q) == 0 ? (int64_t)(v.x - a.x) * (q.x - v.x) + (int64_t)(v.y - a.y) * (q.y - v.y) : 0;
-        int64_t first = lathe__orient(v, q, s) == 0 ? (int64_t)(q.x - v.x) * (s.x - q.x) + (int64_t)(q.y - v.y) * (s.y - q.y) : 0;
+        int64_t last =
+            lathe__orient(a, v, q) == 0 ? (int64_t)(v.x - a.x) * (q.x - v.x) + (int64_t)(v.y - a.y) * (q.y - v.y) : 0;
+        int64_t first =
+            lathe__orient(v, q, s) == 0 ? (int64_t)(q.x - v.x) * (s.x - q.x) + (int64_t)(q.y - v.y) * (s.y - q.y) : 0;
         if (last < 0) n--, b->repairs.spikes++, changed = true;
         else if (first < 0) memmove(p, p + 1, --n * sizeof *p), b->repairs.spikes++, changed = true;
     }
@@ -203,10 +213,12 @@ static lathe_status read_polygons(building *b, uint32_t section) {
         const lathe_raw_polygon *p = &b->raw->polygons[raw->first + k];
         lathe_point *to = o->points + o->point_count;
         for (uint32_t i = 0; i < p->count; i++)
-            to[i] = (lathe_point){to_lattice(b, b->raw->points[p->first + i][0], 0), to_lattice(b, b->raw->points[p->first + i][1], 1)};
+            to[i] = (lathe_point){to_lattice(b, b->raw->points[p->first + i][0], 0),
+                                  to_lattice(b, b->raw->points[p->first + i][1], 1)};
         uint32_t n = clean_polygon(b, to, p->count);
         if (n < 3)
-            return lathe_fail(b->err, LATHE_ERR_FORMAT, "section %u, polygon %u: it has no area: its points lie on a line, or closer than %g mm",
+            return lathe_fail(b->err, LATHE_ERR_FORMAT,
+                              "section %u, polygon %u: it has no area: its points lie on a line, or closer than %g mm",
                               given, k, b->step);
         o->loops[o->loop_count++] = (lathe_loop){.first = o->point_count, .count = n};
         o->point_count += n;
@@ -225,15 +237,19 @@ static lathe_status check_polygons(building *b, uint32_t section) {
     bool found;
     uint32_t edge[2];
     lathe_status status = lathe__find_meeting_edges(&found, edge, &b->scratch, o, &b->tests);
-    if (status == LATHE_ERR_LIMIT) return lathe_fail(b->err, status, "section %u: too many edges lie close together", b->order[section]);
+    if (status == LATHE_ERR_LIMIT)
+        return lathe_fail(b->err, status, "section %u: too many edges lie close together", b->order[section]);
     if (status || !found) return status;
     uint32_t p = loop_of(o, edge[0]), q = loop_of(o, edge[1]);
     lathe_point at = o->points[edge[0]];
-    double x = b->origin[0] + (at.x - MARGIN) / LATHE_SET_QUANTUM * b->step, y = b->origin[1] + (at.y - MARGIN) / LATHE_SET_QUANTUM * b->step;
+    double x = b->origin[0] + (double)(at.x - MARGIN) / LATHE_SET_QUANTUM * b->step,
+           y = b->origin[1] + (double)(at.y - MARGIN) / LATHE_SET_QUANTUM * b->step;
     if (p == q)
-        return lathe_fail(b->err, LATHE_ERR_FORMAT, "section %u, polygon %u: it touches or crosses itself, on the edge from (%g, %g) mm",
+        return lathe_fail(b->err, LATHE_ERR_FORMAT,
+                          "section %u, polygon %u: it touches or crosses itself, on the edge from (%g, %g) mm",
                           b->order[section], p, x, y);
-    return lathe_fail(b->err, LATHE_ERR_FORMAT, "section %u: polygons %u and %u touch or cross, on the edge from (%g, %g) mm", b->order[section],
+    return lathe_fail(b->err, LATHE_ERR_FORMAT,
+                      "section %u: polygons %u and %u touch or cross, on the edge from (%g, %g) mm", b->order[section],
                       p < q ? p : q, p < q ? q : p, x, y);
 }
 
@@ -270,7 +286,8 @@ static lathe_status build(building *b) {
     return status;
 }
 
-lathe_status lathe__contour_set_build(lathe_contour_set *out, lathe_set_repairs *repairs, const lathe_raw_set *raw, lathe_error *err) {
+lathe_status lathe__contour_set_build(lathe_contour_set *out, lathe_set_repairs *repairs, const lathe_raw_set *raw,
+                                      lathe_error *err) {
     building b = {.raw = raw, .err = err, .tests = (uint64_t)1 << 29};
     lathe_status status = build(&b);
     lathe__arena_free(&b.scratch);
@@ -290,7 +307,8 @@ static double value_at(const lathe_volume *volume, const int32_t frame[3], const
     for (int k = 0; k < 3; k++) p[frame[k]] = at[k];
     for (int k = 0; k < 3; k++)
         if (p[k] < 0 || p[k] >= volume->dims[k]) return volume->min;
-    return volume->values[((size_t)p[2] * (size_t)volume->dims[1] + (size_t)p[1]) * (size_t)volume->dims[0] + (size_t)p[0]];
+    return volume
+        ->values[((size_t)p[2] * (size_t)volume->dims[1] + (size_t)p[1]) * (size_t)volume->dims[0] + (size_t)p[0]];
 }
 
 int lathe__mean_fraction(const lathe_mask *mask, const lathe_volume *volume, lathe_axis axis, double iso) {
@@ -304,7 +322,8 @@ int lathe__mean_fraction(const lathe_mask *mask, const lathe_volume *volume, lat
                     const uint64_t *slice = lathe__mask_slice(mask, w);
                     bool here = lathe__slice_pixel(slice, mask->row_words, u, v);
                     if (here == lathe__slice_pixel(slice, mask->row_words, u + !d, v + d)) continue;
-                    int32_t at[3] = {mask->origin[0] + u, mask->origin[1] + v, mask->origin[2] + w}, to[3] = {at[0] + !d, at[1] + d, at[2]};
+                    int32_t at[3] = {mask->origin[0] + u, mask->origin[1] + v, mask->origin[2] + w},
+                            to[3] = {at[0] + !d, at[1] + d, at[2]};
                     double a = value_at(volume, frame, here ? at : to), b = value_at(volume, frame, here ? to : at);
                     sum += a > b ? (a - iso) / (a - b) : 0.5;
                     count++;
@@ -313,14 +332,20 @@ int lathe__mean_fraction(const lathe_mask *mask, const lathe_volume *volume, lat
     return fraction < 8 ? 8 : fraction > 56 ? 56 : fraction;
 }
 
-lathe_status lathe__contour_set_of_mask(lathe_contour_set *out, const lathe_mask *mask, const lathe_transform *transform, int fraction) {
+lathe_status lathe__contour_set_of_mask(lathe_contour_set *out, const lathe_mask *mask,
+                                        const lathe_transform *transform, int fraction) {
     lathe_contour_set set = {.count = (uint32_t)mask->size[2], .transform = *transform};
     set.sections = LATHE_NEW(&set.arena, lathe_section, set.count);
     lathe_status status = set.sections ? LATHE_OK : LATHE_ERR_MEMORY;
     for (int32_t w = 0; !status && w < mask->size[2]; w++) {
-        lathe_slice_view view = {.pixels = lathe__mask_slice(mask, w), .below = w ? lathe__mask_slice(mask, w - 1) : NULL,
-                                 .above = w + 1 < mask->size[2] ? lathe__mask_slice(mask, w + 1) : NULL, .width = mask->size[0],
-                                 .height = mask->size[1], .row_words = mask->row_words, .parity = w & 1, .fraction = fraction};
+        lathe_slice_view view = {.pixels = lathe__mask_slice(mask, w),
+                                 .below = w ? lathe__mask_slice(mask, w - 1) : NULL,
+                                 .above = w + 1 < mask->size[2] ? lathe__mask_slice(mask, w + 1) : NULL,
+                                 .width = mask->size[0],
+                                 .height = mask->size[1],
+                                 .row_words = mask->row_words,
+                                 .parity = w & 1,
+                                 .fraction = fraction};
         int32_t *border;
         set.sections[w].height = w * LATHE_LATTICE_ONE;
         status = lathe__trace_outline(&set.sections[w].outline, &border, &set.arena, &view);
@@ -333,7 +358,8 @@ lathe_status lathe__contour_set_of_mask(lathe_contour_set *out, const lathe_mask
 /* A lattice unit's length in the slice plane, mm; the shorter side of a pixel. */
 static double unit_of(const lathe_contour_set *set) {
     const double(*m)[4] = set->transform.m;
-    return sqrt(fmin(m[0][0] * m[0][0] + m[1][0] * m[1][0] + m[2][0] * m[2][0], m[0][1] * m[0][1] + m[1][1] * m[1][1] + m[2][1] * m[2][1]));
+    return sqrt(fmin(m[0][0] * m[0][0] + m[1][0] * m[1][0] + m[2][0] * m[2][0],
+                     m[0][1] * m[0][1] + m[1][1] * m[1][1] + m[2][1] * m[2][1]));
 }
 
 lathe_status lathe__contour_set_strip(lathe_contour_set *set, double tolerance_mm) {
@@ -343,7 +369,8 @@ lathe_status lathe__contour_set_strip(lathe_contour_set *set, double tolerance_m
     for (uint32_t s = 0; !status && s < set->count; s++) {
         lathe_outline less;
         if (!set->sections[s].outline.point_count) continue;
-        status = lathe__strip_outline(&less, &set->arena, &set->sections[s].outline, tolerance > 1e9 ? 1000000000 : (int32_t)tolerance);
+        status = lathe__strip_outline(&less, &set->arena, &set->sections[s].outline,
+                                      tolerance > 1e9 ? 1000000000 : (int32_t)tolerance);
         if (!status) set->sections[s].outline = less;
     }
     return status;

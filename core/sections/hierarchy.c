@@ -1,15 +1,16 @@
 /* The algorithm of [H 2.3]: HRESOLVE, EXPAND_TREE, RESOLVE_TREE, EXPAND_CROSS_LINK, CHECK_ADD_CROSS_LINK.
  *
- * The pieces that stand for the outline at some tolerance are the front. It begins as the root and moves down: the piece with the
- * greatest attribute a is expanded; where chords then meet, the greater piece of each meeting pair is expanded as well and inherits
- * a, until none meet. So the front after each round is the outline at all tolerances from the next attribute up to a, and each
- * front is checked. Two pieces are cross-linked while their octangles overlap; only the children of linked pieces can be, since an
- * octangle holds all that is below it. Pieces that follow each other always are, by their common vertex; that is one link each.
+ * The pieces that stand for the outline at some tolerance are the front. It begins as the root and moves down: the
+ * piece with the greatest attribute a is expanded; where chords then meet, the greater piece of each meeting pair is
+ * expanded as well and inherits a, until none meet. So the front after each round is the outline at all tolerances
+ * from the next attribute up to a, and each front is checked. Two pieces are cross-linked while their octangles
+ * overlap; only the children of linked pieces can be, since an octangle holds all that is below it. Pieces that
+ * follow each other always are, by their common vertex; that is one link each.
  *
- * What the paper leaves out: loops that are stepped over (piece_tree.c: a static property of a piece, so such pieces are *forced*:
- * expanded with their parents), and loops that turn over (the area of each loop is kept while the front moves). RESOLVE_TREE as
- * printed raises the attributes of the children, too; here they keep their own, since they need not be expanded: more tolerances
- * remain different. */
+ * What the paper leaves out: loops that are stepped over (piece_tree.c: a static property of a piece, so such pieces
+ * are *forced*: expanded with their parents), and loops that turn over (the area of each loop is kept while the
+ * front moves). RESOLVE_TREE as printed raises the attributes of the children, too; here they keep their own, since
+ * they need not be expanded: more tolerances remain different. */
 #include "hierarchy.h"
 #include <math.h>
 #include <stdlib.h>
@@ -34,7 +35,8 @@ typedef struct resolver {
     link *links;
     uint32_t link_count, link_capacity, free_link, live_links;
     heap pieces, meetings;             /* by attribute: what to expand; links whose chords meet */
-    lathe_piece *front;                /* per vertex: the piece of the front that begins in it; only at vertices of the front */
+    lathe_piece *front;                /* per vertex: the piece of the front that begins in it; only at vertices of
+                                        * the front */
     uint64_t *area;                    /* per loop: twice its signed area now, modulo 2^64 (a simple loop's fits) */
     bool *negative, *touched;          /* per loop: the sign it must have; whether it has changed in this round */
     uint32_t *changed, changed_count;
@@ -144,7 +146,8 @@ static bool chords_meet(const lathe_piece_tree *tree, lathe_piece p, lathe_piece
     if (abc * abd > 0 || cda * cdb > 0) return false;
     if (abc || abd || cda || cdb) return true;
     for (int k = 0; k < 2; k++) {      /* all on one line: do the ranges overlap? */
-        int32_t a1 = k ? at[a].y : at[a].x, b1 = k ? at[b].y : at[b].x, c1 = k ? at[c].y : at[c].x, d1 = k ? at[d].y : at[d].x;
+        int32_t a1 = k ? at[a].y : at[a].x, b1 = k ? at[b].y : at[b].x, c1 = k ? at[c].y : at[c].x,
+                d1 = k ? at[d].y : at[d].x;
         if ((a1 > b1 ? a1 : b1) < (c1 < d1 ? c1 : d1) || (c1 > d1 ? c1 : d1) < (a1 < b1 ? a1 : b1)) return false;
     }
     return true;
@@ -154,10 +157,13 @@ static bool is_group(const resolver *r, lathe_piece piece) { return !is_edge(pie
 
 static lathe_octangle octangle_of(const resolver *r, lathe_piece piece) {
     if (!is_edge(piece)) return r->tree.nodes[piece].bound;
-    return lathe__octangle_of(r->tree.at[lathe__piece_from(&r->tree, piece)], r->tree.at[lathe__piece_to(&r->tree, piece)]);
+    return lathe__octangle_of(r->tree.at[lathe__piece_from(&r->tree, piece)],
+                              r->tree.at[lathe__piece_to(&r->tree, piece)]);
 }
 
-static double attribute_of(const resolver *r, lathe_piece piece) { return is_edge(piece) ? -1 : r->tree.nodes[piece].attribute; }
+static double attribute_of(const resolver *r, lathe_piece piece) {
+    return is_edge(piece) ? -1 : r->tree.nodes[piece].attribute;
+}
 
 /* CHECK_ADD_CROSS_LINK. Two edges of the outline itself are tested once and need no link. */
 static lathe_status check_pair(resolver *r, lathe_piece p, const lathe_octangle *bound, lathe_piece q) {
@@ -262,7 +268,9 @@ static lathe_status play_round(resolver *r) {
         if (!status) status = resolve_meetings(r);
         if (status || (r->pieces.count && r->pieces.items[0].key >= r->attribute)) continue;
         uint32_t i = 0;
-        while (i < r->changed_count && (r->area[r->changed[i]] >> 63 != 0) == r->negative[r->changed[i]] && r->area[r->changed[i]]) i++;
+        while (i < r->changed_count && (r->area[r->changed[i]] >> 63 != 0) == r->negative[r->changed[i]] &&
+               r->area[r->changed[i]])
+            i++;
         if (i == r->changed_count) break;
         status = turn_back(r, r->changed[i]);
     }
@@ -300,7 +308,8 @@ static lathe_status prepare(resolver *r, uint64_t most_tests) {
     r->negative = LATHE_NEW(r->arena, bool, loops);
     r->touched = LATHE_NEW(r->arena, bool, loops);
     r->changed = LATHE_NEW(r->arena, uint32_t, loops);
-    if (!r->node_links || !r->edge_links || !r->front || !r->area || !r->negative || !r->touched || !r->changed) return LATHE_ERR_MEMORY;
+    if (!r->node_links || !r->edge_links || !r->front || !r->area || !r->negative || !r->touched || !r->changed)
+        return LATHE_ERR_MEMORY;
     memset(r->node_links, 0xff, r->tree.node_count * sizeof *r->node_links);
     memset(r->edge_links, 0xff, n * sizeof *r->edge_links);
     memset(r->touched, 0, loops * sizeof *r->touched);
@@ -345,7 +354,8 @@ static lathe_status count_unresolved(resolver *r) {
     for (uint32_t i = 0; i < n; i++)
         for (int k = 0; k < 2; k++) {
             lathe_piece child = nodes[i].child[k];
-            if (!is_edge(child) && nodes[child].attribute > nodes[i].attribute) nodes[child].attribute = nodes[i].attribute;
+            if (!is_edge(child) && nodes[child].attribute > nodes[i].attribute)
+                nodes[child].attribute = nodes[i].attribute;
         }
     for (uint32_t i = 0; i < n; i++) values[i] = nodes[i].attribute;
     r->counts.adjusted = distinct(values, n) + 1;
@@ -366,7 +376,8 @@ static lathe_status count_printed(resolver *r) {
     return LATHE_OK;
 }
 
-static lathe_status write_result(lathe_hierarchy *out, lathe_arena *arena, const resolver *r, const lathe_outline *outline) {
+static lathe_status write_result(lathe_hierarchy *out, lathe_arena *arena, const resolver *r,
+                                 const lathe_outline *outline) {
     const lathe_piece_tree *tree = &r->tree;
     uint32_t n = tree->point_count;
     lathe_hierarchy h = {.outline = outline, .counts = r->counts};
@@ -390,10 +401,12 @@ static lathe_status write_result(lathe_hierarchy *out, lathe_arena *arena, const
 }
 
 lathe_status lathe__hierarchy_build(lathe_hierarchy *out, lathe_arena *arena, const lathe_outline *outline) {
-    return lathe__hierarchy_build_within(out, arena, outline, ((uint64_t)1 << 24) + 256 * (uint64_t)outline->point_count);
+    return lathe__hierarchy_build_within(out, arena, outline,
+                                         ((uint64_t)1 << 24) + 256 * (uint64_t)outline->point_count);
 }
 
-lathe_status lathe__hierarchy_build_within(lathe_hierarchy *out, lathe_arena *arena, const lathe_outline *outline, uint64_t most_tests) {
+lathe_status lathe__hierarchy_build_within(lathe_hierarchy *out, lathe_arena *arena, const lathe_outline *outline,
+                                           uint64_t most_tests) {
     lathe_arena scratch = {0};
     resolver r = {.arena = &scratch};
     lathe_status status = lathe__piece_tree_build(&r.tree, &scratch, outline);
@@ -419,7 +432,8 @@ const double *lathe__hierarchy_tolerances(uint32_t *count, const lathe_hierarchy
     return hierarchy->tolerances;
 }
 
-lathe_status lathe__hierarchy_outline(lathe_outline *out, lathe_arena *arena, const lathe_hierarchy *hierarchy, double tolerance) {
+lathe_status lathe__hierarchy_outline(lathe_outline *out, lathe_arena *arena, const lathe_hierarchy *hierarchy,
+                                      double tolerance) {
     const lathe_outline *whole = hierarchy->outline;
     uint32_t n = 0;
     bool all = !(tolerance > 0);
@@ -444,7 +458,8 @@ lathe_status lathe__hierarchy_outline(lathe_outline *out, lathe_arena *arena, co
     return LATHE_OK;
 }
 
-lathe_status lathe__simplify_section(lathe_outline *out, lathe_arena *arena, const lathe_outline *outline, double tolerance) {
+lathe_status lathe__simplify_section(lathe_outline *out, lathe_arena *arena, const lathe_outline *outline,
+                                     double tolerance) {
     lathe_arena scratch = {0};
     lathe_hierarchy hierarchy;
     lathe_status status = lathe__hierarchy_build(&hierarchy, &scratch, outline);

@@ -102,13 +102,18 @@ static bool is_pair(const lathe_derivation *t, uint32_t node) {
     bool group = symbol == LATHE_DER_D || symbol == LATHE_DER_U || symbol == LATHE_DER_D_R || symbol == LATHE_DER_U_R;
     return group && t->nodes[t->nodes[node].child].symbol >= LATHE_DER_D_I; /* not a part over several pairs */
 }
+/* The contour's edge at a place of the tree's string, which is at most edge_count. */
+static uint32_t edge_at(const lathe_derivation *t, uint32_t place) {
+    uint32_t edge = t->start + place;
+    return edge < t->edge_count ? edge : edge - t->edge_count;
+}
 /* Of each edge the innermost pair it belongs to, or NONE: nodes are in preorder, so parents come first. */
 static void find_pairs(uint32_t *pair_of, uint32_t *pair_above, const lathe_derivation *t) {
     for (uint32_t i = 0; i < t->edge_count; i++) pair_of[i] = NONE;
     pair_above[0] = NONE;
     for (uint32_t i = 0; i < t->node_count; i++) {
         uint32_t here = is_pair(t, i) ? i : pair_above[i];
-        if (t->nodes[i].symbol == LATHE_DER_LEAF) pair_of[(t->start + t->nodes[i].first) % t->edge_count] = here;
+        if (t->nodes[i].symbol == LATHE_DER_LEAF) pair_of[edge_at(t, t->nodes[i].first)] = here;
         for (uint32_t k = t->nodes[i].child; k != NONE; k = t->nodes[k].next) pair_above[k] = here;
     }
 }
@@ -134,7 +139,7 @@ static void mark_removed(uint8_t *removed, const lathe_derivation *t, const faul
         if (!condemned[i]) continue;
         uint32_t end = t->nodes[i].first + t->nodes[i].count;
         for (uint32_t k = t->nodes[i].first + 1 > done ? t->nodes[i].first + 1 : done; k <= end; k++)
-            removed[(t->start + k) % t->edge_count] = 1;
+            removed[edge_at(t, k)] = 1;
         if (end + 1 > done) done = end + 1;
     }
 }

@@ -1,6 +1,7 @@
-/* Douglas-Peucker without its quadratic worst case: blocks of points have octangles, and a block is looked into only if one of its
- * octangle's corners is farther from the chord than the best point so far. On natural shapes that is as good as looking at every
- * point, on spirals and combs far better; and should it not be, pieces are halved in their middle after 512 distances a point. */
+/* Douglas-Peucker without its quadratic worst case: blocks of points have octangles, and a block is looked into only
+ * if one of its octangle's corners is farther from the chord than the best point so far. On natural shapes that is
+ * as good as looking at every point, on spirals and combs far better; and should it not be, pieces are halved in
+ * their middle after 512 distances a point. */
 #include "piece_tree.h"
 #include <math.h>
 #include <stdlib.h>
@@ -123,7 +124,8 @@ static lathe_piece new_node(lathe_piece_tree *tree, lathe_piece_node node) {
 static lathe_piece new_piece(lathe_piece_tree *tree, uint32_t loop, uint32_t from, uint32_t to) {
     uint32_t end = tree->loops[loop].first + tree->loops[loop].count;
     if ((to > from ? to : end) == from + 1) return LATHE_PIECE_EDGE | from;
-    return new_node(tree, (lathe_piece_node){.from = from, .to = to, .loop = loop, .child = {LATHE_NO_PIECE, LATHE_NO_PIECE}});
+    return new_node(
+        tree, (lathe_piece_node){.from = from, .to = to, .loop = loop, .child = {LATHE_NO_PIECE, LATHE_NO_PIECE}});
 }
 
 static uint32_t farthest_vertex(const lathe_piece_tree *tree, const lathe_loop *loop) {
@@ -186,7 +188,8 @@ static lathe_status group_loops(search *s, lathe_arena *arena) {
     if (!places || !stack) return LATHE_ERR_MEMORY;
     for (uint32_t l = 0; l < count; l++) {
         lathe_point p = tree->at[tree->loops[l].first];
-        places[l] = (place){spread((uint32_t)(p.x + MAX_COORDINATE)) | spread((uint32_t)(p.y + MAX_COORDINATE)) << 1, l};
+        places[l] =
+            (place){spread((uint32_t)(p.x + MAX_COORDINATE)) | spread((uint32_t)(p.y + MAX_COORDINATE)) << 1, l};
     }
     qsort(places, count, sizeof *places, by_key);
     const lathe_piece_node group = {.group = true, .error = INFINITY};
@@ -251,7 +254,8 @@ static lathe_status copy_points(lathe_piece_tree *tree, const lathe_outline *out
         uint32_t lowest = 0;
         for (uint32_t i = 0; i < loop->count; i++) {
             if (!in_range(points[i])) return LATHE_ERR_RANGE;
-            if (points[i].y < points[lowest].y || (points[i].y == points[lowest].y && points[i].x < points[lowest].x)) lowest = i;
+            if (points[i].y < points[lowest].y || (points[i].y == points[lowest].y && points[i].x < points[lowest].x))
+                lowest = i;
         }
         tree->rotation[l] = lowest;
         for (uint32_t i = 0; i < loop->count; i++) {
@@ -270,7 +274,8 @@ lathe_status lathe__piece_tree_build(lathe_piece_tree *tree, lathe_arena *arena,
     tree->at = LATHE_NEW(arena, lathe_point, n);
     tree->loop_of = LATHE_NEW(arena, uint32_t, n);
     tree->rotation = LATHE_NEW(arena, uint32_t, loops);
-    /* A loop of c points has c - 2 splits and a node that joins its halves; one less than there are loops joins them. */
+    /* A loop of c points has c - 2 splits and a node that joins its halves; one less than there are loops joins
+     * them. */
     tree->nodes = LATHE_NEW(arena, lathe_piece_node, n);
     if (!tree->at || !tree->loop_of || !tree->rotation || !tree->nodes) return LATHE_ERR_MEMORY;
     lathe_status status = copy_points(tree, outline);
@@ -286,17 +291,18 @@ lathe_status lathe__piece_tree_build(lathe_piece_tree *tree, lathe_arena *arena,
 
 /* ---- nesting ---- */
 
-/* Is an edge above a point crossed by the ray from it to the right? The same for both directions of the edge, so that parities add
- * up whatever lies on what. */
+/* Is an edge above a point crossed by the ray from it to the right? The same for both directions of the edge, so
+ * that parities add up whatever lies on what. */
 static bool crosses(const lathe_point *at, uint32_t a, uint32_t b, lathe_point p) {
     if ((at[a].y > p.y) == (at[b].y > p.y)) return false;
     return at[a].y > at[b].y ? lathe__orient(at[b], at[a], p) > 0 : lathe__orient(at[a], at[b], p) > 0;
 }
 
-/* A point is cut off by a piece if it lies between the piece and its chord. That is so for a piece if an odd number of the
- * following holds: it is cut off by the first child, by the second, it lies in the triangle of the three chords. Only pieces whose
- * octangle holds the point can cut it off. */
-static lathe_status mark_for(lathe_piece_tree *tree, uint32_t own, uint8_t *odd, lathe_piece *list, uint64_t *steps, uint64_t most) {
+/* A point is cut off by a piece if it lies between the piece and its chord. That is so for a piece if an odd number
+ * of the following holds: it is cut off by the first child, by the second, it lies in the triangle of the three
+ * chords. Only pieces whose octangle holds the point can cut it off. */
+static lathe_status mark_for(lathe_piece_tree *tree, uint32_t own, uint8_t *odd, lathe_piece *list, uint64_t *steps,
+                             uint64_t most) {
     lathe_point p = tree->at[tree->loops[own].first];
     uint32_t count = 0;
     list[count++] = 0;

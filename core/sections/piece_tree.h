@@ -1,10 +1,12 @@
-/* The binary tree of the pieces of an outline [H 1, 2.1]: Douglas-Peucker's, with octangles and errors; all loops in one tree. */
+/* The binary tree of the pieces of an outline [H 1, 2.1]: Douglas-Peucker's, with octangles and errors; all loops in
+ * one tree. */
 #ifndef LATHE_PIECE_TREE_H
 #define LATHE_PIECE_TREE_H
 #include "octangle.h"
 #include "hierarchy.h"
 
-/* A piece of a loop from one vertex to another: the index of a node, or a single edge: PIECE_EDGE + the vertex it begins in. */
+/* A piece of a loop from one vertex to another: the index of a node, or a single edge: PIECE_EDGE + the vertex it
+ * begins in. */
 typedef uint32_t lathe_piece;
 #define LATHE_PIECE_EDGE 0x80000000u
 #define LATHE_NO_PIECE 0xffffffffu
@@ -35,8 +37,8 @@ typedef struct lathe_piece_tree {
 
 /* Memory is the arena's. FORMAT, RANGE, LIMIT, MEMORY as lathe__hierarchy_build has them. */
 lathe_status lathe__piece_tree_build(lathe_piece_tree *tree, lathe_arena *arena, const lathe_outline *outline);
-/* Marks pieces whose chord would have a vertex of another loop change sides. False: more than `most` steps; nothing is to be relied
- * on then. MEMORY: status. */
+/* Marks pieces whose chord would have a vertex of another loop change sides. False: more than `most` steps; nothing
+ * is to be relied on then. MEMORY: status. */
 lathe_status lathe__piece_tree_mark(lathe_piece_tree *tree, lathe_arena *arena, uint64_t most, bool *done);
 
 static inline uint32_t lathe__piece_from(const lathe_piece_tree *tree, lathe_piece piece) {

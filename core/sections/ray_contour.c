@@ -1,5 +1,5 @@
-/* A loop's contour at a number of rays [M 3.1], with turned rays [M 6.1]. Turning the rays is turning the loop the other way
- * about its centre: the crossings keep their segments and fractions. */
+/* A loop's contour at a number of rays [M 3.1], with turned rays [M 6.1]. Turning the rays is turning the loop the
+ * other way about its centre: the crossings keep their segments and fractions. */
 #include <math.h>
 #include "sections.h"
 
@@ -11,10 +11,12 @@ static lathe_point turned_back(lathe_point p, lathe_point centre, lathe_point di
                          centre.y + (int32_t)round_shift(dy * direction.x - dx * direction.y, 14)};
 }
 
-static int32_t between(int32_t a, int32_t b, double t) { return (int32_t)lround((double)a + ((double)b - (double)a) * t); }
+static int32_t between(int32_t a, int32_t b, double t) {
+    return (int32_t)lround((double)a + ((double)b - (double)a) * t);
+}
 
-lathe_status lathe__turn_loop(const lathe_point **out, lathe_arena *arena, const lathe_point *loop, uint32_t count, lathe_point centre,
-                              uint32_t turn) {
+lathe_status lathe__turn_loop(const lathe_point **out, lathe_arena *arena, const lathe_point *loop, uint32_t count,
+                              lathe_point centre, uint32_t turn) {
     *out = loop;
     if (!(turn & 65535)) return LATHE_OK;
     lathe_point direction = lathe__ray_direction(turn & 65535, 65536), *copy = LATHE_NEW(arena, lathe_point, count);
@@ -24,7 +26,8 @@ lathe_status lathe__turn_loop(const lathe_point **out, lathe_arena *arena, const
     return LATHE_OK;
 }
 
-lathe_point lathe__crossing_point(int64_t *radius, const lathe_crossing *x, const lathe_point *loop, uint32_t count, lathe_point centre) {
+lathe_point lathe__crossing_point(int64_t *radius, const lathe_crossing *x, const lathe_point *loop, uint32_t count,
+                                  lathe_point centre) {
     lathe_point p = loop[x->segment], q = loop[x->segment + 1 < count ? x->segment + 1 : 0];
     double t = (double)x->numerator / (double)x->denominator;
     lathe_point at = {between(p.x, q.x, t), between(p.y, q.y, t)};
@@ -32,8 +35,8 @@ lathe_point lathe__crossing_point(int64_t *radius, const lathe_crossing *x, cons
     return at;
 }
 
-lathe_status lathe__make_ray_contour(lathe_ray_contour *out, lathe_arena *arena, const lathe_point *loop, uint32_t count,
-                                     lathe_point centre, uint32_t rays, uint32_t turn) {
+lathe_status lathe__make_ray_contour(lathe_ray_contour *out, lathe_arena *arena, const lathe_point *loop,
+                                     uint32_t count, lathe_point centre, uint32_t rays, uint32_t turn) {
     lathe_ray_contour c = {.centre = centre, .rays = rays, .turn = turn & 65535};
     const lathe_point *cast;
     lathe_status status = lathe__turn_loop(&cast, arena, loop, count, centre, turn);

@@ -39,7 +39,8 @@ static lathe_point moved(lathe_point p, uint32_t seed, int32_t amplitude) {
     h ^= h >> 32;
     /* Even: products of differences stay exact in the overlay's doubles. */
     uint32_t span = (uint32_t)amplitude + 1;
-    return (lathe_point){p.x + (int32_t)((uint32_t)h % span) * 2 - amplitude, p.y + (int32_t)((uint32_t)(h >> 24) % span) * 2 - amplitude};
+    return (lathe_point){p.x + (int32_t)((uint32_t)h % span) * 2 - amplitude,
+                         p.y + (int32_t)((uint32_t)(h >> 24) % span) * 2 - amplitude};
 }
 
 /* Still simple, and still nested as before? */
@@ -88,7 +89,8 @@ static void describe(const reconstruction *r, uint32_t i, lathe_slab_input *in) 
     uint32_t count = r->set->count;
     const lathe_section *s = r->set->sections;
     bool first = i == 0, last = i == count;
-    *in = (lathe_slab_input){.outline = {first ? &air : &r->outlines[i - 1], last ? &air : &r->outlines[i]}, .end = first || last,
+    *in = (lathe_slab_input){.outline = {first ? &air : &r->outlines[i - 1], last ? &air : &r->outlines[i]},
+                             .end = first || last,
                              .cap = r->options->cap};
     /* Beyond the ends there is room for the cap, or for the overlay that a flat cap falls back to. */
     int32_t beyond = r->options->cap ? 2 * r->options->cap : 2 * FIRST_AMPLITUDE;
@@ -125,10 +127,12 @@ static lathe_status build_slab(reconstruction *r, uint32_t i, bool *again) {
     lathe_slab_input in;
     lathe_slab_outcome outcome;
     describe(r, i, &in);
-    lathe_status status = lathe__build_slab(&slab->mesh, &outcome, &slab->counts, &slab->faults, &r->scratch, &in, &r->options->slab);
+    lathe_status status =
+        lathe__build_slab(&slab->mesh, &outcome, &slab->counts, &slab->faults, &r->scratch, &in, &r->options->slab);
     lathe__arena_reset(&r->scratch);
     *again = false;
-    if (status) return lathe_fail(r->err, status, "between sections %d and %u: %s", (int)i - 1, i, lathe_status_name(status));
+    if (status)
+        return lathe_fail(r->err, status, "between sections %d and %u: %s", (int)i - 1, i, lathe_status_name(status));
     slab->overlaid = outcome == LATHE_SLAB_OVERLAID;
     slab->done = true;
     if (outcome != LATHE_SLAB_AT_FAULT) return LATHE_OK;
@@ -138,12 +142,15 @@ static lathe_status build_slab(reconstruction *r, uint32_t i, bool *again) {
     status = lathe__separate_slab(&slab->mesh, &outcome, &slab->faults, &r->scratch, &in);
     lathe__arena_reset(&r->scratch);
     if (!status && outcome == LATHE_SLAB_AT_FAULT) status = LATHE_ERR_LIMIT;
-    if (status) return lathe_fail(r->err, status, "no surface between sections %d and %u: outlines too close together", (int)i - 1, i);
+    if (status)
+        return lathe_fail(r->err, status, "no surface between sections %d and %u: outlines too close together",
+                          (int)i - 1, i);
     slab->done = slab->separated = true;
     return LATHE_OK;
 }
 
-/* A slab at fault sends the walk back to the first slab about its sections; each section moves at most MOST_MOVES times. */
+/* A slab at fault sends the walk back to the first slab about its sections; each section moves at most MOST_MOVES
+ * times. */
 static lathe_status build_slabs(reconstruction *r) {
     for (uint32_t i = 0; i <= r->set->count; i++) {
         bool again;
@@ -229,7 +236,8 @@ static void add_counts(lathe_slab_counts *to, const lathe_slab_counts *c) {
 }
 
 static void write_report(lathe_reconstruct_report *out, const reconstruction *r, const lathe_mesh *mesh) {
-    lathe_reconstruct_report report = {.slabs = r->set->count + 1, .vertices = mesh->vertex_count, .triangles = mesh->triangle_count};
+    lathe_reconstruct_report report = {
+        .slabs = r->set->count + 1, .vertices = mesh->vertex_count, .triangles = mesh->triangle_count};
     for (uint32_t i = 0; i <= r->set->count; i++) {
         const built *slab = &r->slabs[i];
         const lathe_slab_faults *f = &slab->faults;

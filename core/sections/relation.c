@@ -46,8 +46,8 @@ static double area_of(const double (*p)[2], uint32_t n) {
     return sum / 2;
 }
 
-/* Keeps the part of a convex polygon on the left of the line from a to b. A cut adds one corner; where rounding has left corners in
- * a row it could add more, but never beyond `most`. */
+/* Keeps the part of a convex polygon on the left of the line from a to b. A cut adds one corner; where rounding has
+ * left corners in a row it could add more, but never beyond `most`. */
 static uint32_t clip(double (*out)[2], uint32_t most, const double (*in)[2], uint32_t n, lathe_point a, lathe_point b) {
     uint32_t m = 0;
     double dx = (double)b.x - a.x, dy = (double)b.y - a.y;
@@ -71,7 +71,8 @@ static void widen(double (*out)[2], const lathe_point *p, uint32_t n) {
     for (uint32_t i = 0; i < n; i++) out[i][0] = p[i].x, out[i][1] = p[i].y;
 }
 
-double lathe__overlap_degree(const lathe_point *p, uint32_t p_count, const lathe_point *q, uint32_t q_count, double *scratch) {
+double lathe__overlap_degree(const lathe_point *p, uint32_t p_count, const lathe_point *q, uint32_t q_count,
+                             double *scratch) {
     double(*here)[2] = (double(*)[2])scratch, (*there)[2] = here + p_count + q_count;
     if (p_count < 3 || q_count < 3) return 0;
     widen(here, q, q_count);
@@ -90,8 +91,8 @@ double lathe__overlap_degree(const lathe_point *p, uint32_t p_count, const lathe
 }
 
 /* The hulls of all contours, one behind the other. */
-static lathe_status list_hulls(lathe_point **hulls, uint32_t **first, lathe_arena *arena, const lathe_point *points, const uint32_t *at,
-                               uint32_t count) {
+static lathe_status list_hulls(lathe_point **hulls, uint32_t **first, lathe_arena *arena, const lathe_point *points,
+                               const uint32_t *at, uint32_t count) {
     lathe_point *hull = LATHE_NEW(arena, lathe_point, (size_t)at[count] - at[0] + count + 1);
     uint32_t *begin = LATHE_NEW(arena, uint32_t, count + 1), n = 0;
     if (!hull || !begin) return LATHE_ERR_MEMORY;
@@ -107,8 +108,9 @@ static lathe_status list_hulls(lathe_point **hulls, uint32_t **first, lathe_aren
     return LATHE_OK;
 }
 
-lathe_status lathe__relate(lathe_relation *out, lathe_arena *arena, const lathe_point *a, const uint32_t *a_first, uint32_t a_count,
-                           const lathe_point *b, const uint32_t *b_first, uint32_t b_count, double threshold) {
+lathe_status lathe__relate(lathe_relation *out, lathe_arena *arena, const lathe_point *a, const uint32_t *a_first,
+                           uint32_t a_count, const lathe_point *b, const uint32_t *b_first, uint32_t b_count,
+                           double threshold) {
     lathe_relation r = {.rows = a_count, .columns = b_count};
     lathe_point *p, *q;
     uint32_t *pf, *qf;
@@ -178,10 +180,10 @@ static uint32_t find(uint32_t *parent, uint32_t i) {
     return i;
 }
 
-/* Puts one side's lines in order of their blocks; true if they were not. Blocks are numbered as they first occur among the rows,
- * then among the columns without links. */
-static bool gather(uint32_t *order, uint32_t n, uint32_t base, const uint32_t *number, const uint32_t *root, uint32_t *spare, uint32_t *start,
-                   uint32_t blocks) {
+/* Puts one side's lines in order of their blocks; true if they were not. Blocks are numbered as they first occur
+ * among the rows, then among the columns without links. */
+static bool gather(uint32_t *order, uint32_t n, uint32_t base, const uint32_t *number, const uint32_t *root,
+                   uint32_t *spare, uint32_t *start, uint32_t blocks) {
     bool moved = false;
     memset(start, 0, (blocks + 1) * sizeof *start);
     for (uint32_t i = 0; i < n; i++) start[number[root[base + i]] + 1]++;
@@ -216,7 +218,8 @@ static uint32_t number_blocks(const ranking *k, uint32_t *root, uint32_t *number
             for (uint32_t i = 0; i < n; i++) {
                 uint32_t line = k->order[side][i], linked = 0;
                 for (uint32_t j = 0; j < across && !linked; j++) linked = cell(k, side, line, j);
-                if ((linked == 0) == (self == 1) && number[root[base + line]] == UINT32_MAX) number[root[base + line]] = blocks++;
+                if ((linked == 0) == (self == 1) && number[root[base + line]] == UINT32_MAX)
+                    number[root[base + line]] = blocks++;
             }
         }
     return blocks;
@@ -225,7 +228,8 @@ static uint32_t number_blocks(const ranking *k, uint32_t *root, uint32_t *number
 lathe_status lathe__cluster(lathe_clustering *out, lathe_arena *arena, const lathe_relation *r) {
     uint32_t lines = r->rows + r->columns;
     lathe_clustering c = {0};
-    ranking k = {.r = r, .order = {LATHE_NEW(arena, uint32_t, r->rows + 1), LATHE_NEW(arena, uint32_t, r->columns + 1)}};
+    ranking k = {.r = r,
+                 .order = {LATHE_NEW(arena, uint32_t, r->rows + 1), LATHE_NEW(arena, uint32_t, r->columns + 1)}};
     uint32_t *spare = LATHE_NEW(arena, uint32_t, lines + 1), *start = LATHE_NEW(arena, uint32_t, lines + 2);
     uint32_t *root = LATHE_NEW(arena, uint32_t, lines + 1), *number = LATHE_NEW(arena, uint32_t, lines + 1);
     c.blocks = LATHE_NEW(arena, lathe_block, lines + 1);

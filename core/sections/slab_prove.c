@@ -1,7 +1,7 @@
 /* The proof of one slab, by exact predicates. */
 #include "adjacency.h"
 #include "mesh_intersect.h"
-#include "slab_surface.h"
+#include "slab_build.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -22,7 +22,8 @@ bool lathe__slab_is_sound(const lathe_slab_faults *f) {
 }
 
 lathe_status lathe__start_slab(lathe_mesh_builder *builder, const lathe_slab_input *in) {
-    lathe_status status = lathe__builder_reserve(builder, (size_t)in->outline[0]->point_count + in->outline[1]->point_count, 16);
+    lathe_status status =
+        lathe__builder_reserve(builder, (size_t)in->outline[0]->point_count + in->outline[1]->point_count, 16);
     for (int s = 0; !status && s < 2; s++)
         for (uint32_t i = 0; i < in->outline[s]->point_count; i++) {
             int32_t *v = builder->mesh.lattice[builder->mesh.vertex_count++];
@@ -33,8 +34,8 @@ lathe_status lathe__start_slab(lathe_mesh_builder *builder, const lathe_slab_inp
 
 static int side_of(const proof *p, uint32_t v) { return (v >= p->upper) + (v >= p->vertices); }
 
-/* Follows the triangles around v from a half-edge that leaves it; true if they are all of v's, and end at `last` (NONE: where they
- * began). */
+/* Follows the triangles around v from a half-edge that leaves it; true if they are all of v's, and end at `last`
+ * (NONE: where they began). */
 static bool is_one_fan(const proof *p, uint32_t v, uint32_t corner, uint32_t last) {
     uint32_t steps = 0, first = corner, previous = NONE;
     do {
@@ -136,11 +137,13 @@ static lathe_status link_vertices(proof *p, lathe_arena *arena) {
     return LATHE_OK;
 }
 
-lathe_status lathe__prove_slab(lathe_slab_faults *out, lathe_arena *arena, const lathe_mesh *mesh, const lathe_slab_input *in) {
+lathe_status lathe__prove_slab(lathe_slab_faults *out, lathe_arena *arena, const lathe_mesh *mesh,
+                               const lathe_slab_input *in) {
     lathe_slab_faults faults = {0};
     proof p = {.mesh = mesh, .in = in, .faults = &faults};
     lathe_status status = link_vertices(&p, arena);
-    if (!status) status = lathe__half_edges_build(&p.edges, arena, (const uint32_t(*)[3])mesh->triangles, mesh->triangle_count);
+    if (!status)
+        status = lathe__half_edges_build(&p.edges, arena, (const uint32_t(*)[3])mesh->triangles, mesh->triangle_count);
     if (status) return status;
     check_triangles(&p);
     check_edges(&p);

@@ -118,7 +118,8 @@ static lathe_status find_edges(lathe_smooth *s) {
     if (!status) {
         sort_sides(sides, first, &s->source);
         for (size_t v = 0; v < s->source.vertex_count; v++)
-            if (first[v + 1] - first[v] > 1) qsort(sides + first[v], first[v + 1] - first[v], sizeof *sides, compare_sides);
+            if (first[v + 1] - first[v] > 1)
+                qsort(sides + first[v], first[v + 1] - first[v], sizeof *sides, compare_sides);
         s->edge_count = number_edges(s, NULL, sides, first);
         s->edges = malloc(s->edge_count * sizeof *s->edges);
         if (!s->edges) status = LATHE_ERR_MEMORY;
@@ -131,8 +132,8 @@ static lathe_status find_edges(lathe_smooth *s) {
 
 static bool edge_flat(const lathe_smooth *s, uint32_t edge) {
     const uint32_t *end = s->edges[edge];
-    return lathe__smooth_edge_flat(load(s->source.positions, end[0]), load(s->source.positions, end[1]), load(s->normals, end[0]),
-                                   load(s->normals, end[1]));
+    return lathe__smooth_edge_flat(load(s->source.positions, end[0]), load(s->source.positions, end[1]),
+                                   load(s->normals, end[0]), load(s->normals, end[1]));
 }
 
 static void count_flat(lathe_smooth *s) {
@@ -238,12 +239,13 @@ static void number_sheet(sheet *s) {
 static vec flat_normal(const lathe_smooth *smooth, uint32_t triangle) {
     const uint32_t *index = smooth->source.triangles + (size_t)3 * triangle;
     vec p = load(smooth->source.positions, index[0]);
-    vec a = lathe__vec_sub(load(smooth->source.positions, index[1]), p), b = lathe__vec_sub(load(smooth->source.positions, index[2]), p);
+    vec a = lathe__vec_sub(load(smooth->source.positions, index[1]), p),
+        b = lathe__vec_sub(load(smooth->source.positions, index[2]), p);
     return lathe__vec_unit(lathe__vec_cross(a, b));
 }
 
-/* Points on an edge are evaluated by every triangle there: the curve is the same for all, so which one writes last moves them by rounding at
- * most. Their normals are summed. */
+/* Points on an edge are evaluated by every triangle there: the curve is the same for all, so which one writes last
+ * moves them by rounding at most. Their normals are summed. */
 static void evaluate_sheet(const sheet *s, double *positions, double *normals) {
     lathe_smooth_patch patch;
     lathe__smooth_triangle(&patch, s->smooth, s->triangle);

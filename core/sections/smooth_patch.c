@@ -1,8 +1,10 @@
-/* Three quartic triangular Bezier patches for one triangle, from its corners and their normals [P 4, figures 12 and 13].
+/* Three quartic triangular Bezier patches for one triangle, from its corners and their normals [P 4, figures 12 and
+ * 13].
  *
- * Each edge is a cubic, raised to degree four. Derivatives across it are k(t) V(t) + h(t) S(t): S the edge's own derivative (quadratic), V
- * the direction across it (linear, from end to end), k and h linear, fixed by the corners. As S and V depend on the edge and its normals
- * alone, the patches at both sides have the same tangent planes. Inside, each point is the mean of three: derivatives are continuous. */
+ * Each edge is a cubic, raised to degree four. Derivatives across it are k(t) V(t) + h(t) S(t): S the edge's own
+ * derivative (quadratic), V the direction across it (linear, from end to end), k and h linear, fixed by the corners.
+ * As S and V depend on the edge and its normals alone, the patches at both sides have the same tangent planes.
+ * Inside, each point is the mean of three: derivatives are continuous. */
 #include "smooth.h"
 #include <string.h>
 
@@ -20,14 +22,16 @@ static vec mean2(vec a, vec b) { return scale(0.5, add(a, b)); }
 
 /* ---- edges ---- */
 
-/* Below this sine between edge and normal the edge has no direction in the tangent plane worth following (about 6 degrees). */
+/* Below this sine between edge and normal the edge has no direction in the tangent plane worth following (about 6
+ * degrees). */
 #define MIN_PROJECTION 0.1
 /* Below this cosine between the directions across an edge at its ends, the direction between them is lost. */
 #define MIN_ACROSS (-0.7)
 
-/* The curve leaves along the edge's projection on the tangent plane (Piper). Its first control point lies as far along as for the circular
- * arc that makes this angle with its chord: 2 c / (3 (1 + cos)), between c/3 and 2c/3. The projection's own third, which shrinks to
- * nothing as the edge gets steep, leaves an octahedron three times as far from its sphere. */
+/* The curve leaves along the edge's projection on the tangent plane (Piper). Its first control point lies as far
+ * along as for the circular arc that makes this angle with its chord: 2 c / (3 (1 + cos)), between c/3 and 2c/3. The
+ * projection's own third, which shrinks to nothing as the edge gets steep, leaves an octahedron three times as far
+ * from its sphere. */
 static vec tangent(vec edge, vec normal) {
     double chord = lathe__vec_length(edge);
     vec flat = sub(edge, scale(dot(edge, normal), normal));
@@ -107,8 +111,8 @@ static void tangent_points(vec *at, const edge *e) {
 
 /* ---- inside ---- */
 
-/* The middle points of row 2 are free. They are those of one quartic triangle over all three patches, whose own inner points are the mean of
- * what its two edges ask for: so a surface that is one quartic comes out exactly. */
+/* The middle points of row 2 are free. They are those of one quartic triangle over all three patches, whose own
+ * inner points are the mean of what its two edges ask for: so a surface that is one quartic comes out exactly. */
 static void middle_points(lathe_smooth_patch *out) {
     vec inner[3];
     for (int e = 0; e < 3; e++) {

@@ -1,5 +1,6 @@
-/* Pixel staircases to polygons [L], all loops of a slice together: each loop is approximated alone, then pieces that meet another one,
- * or step over another loop, get their farthest vertex back until nothing offends. Whole loops are simple, so it ends. */
+/* Pixel staircases to polygons [L], all loops of a slice together: each loop is approximated alone, then pieces that
+ * meet another one, or step over another loop, get their farthest vertex back until nothing offends and all are
+ * within the tolerance. Whole loops are simple, so it ends. */
 #include <stdlib.h>
 #include <string.h>
 #include "closing.h"
@@ -19,7 +20,9 @@ typedef struct section {
     uint32_t count;
 } section;
 
-static uint32_t after(const lathe_loop *loop, uint32_t v) { return v + 1 < loop->first + loop->count ? v + 1 : loop->first; }
+static uint32_t after(const lathe_loop *loop, uint32_t v) {
+    return v + 1 < loop->first + loop->count ? v + 1 : loop->first;
+}
 
 /* The loop from its leftmost point on, which every approximation keeps, round to it again. */
 static lathe_status approximate(section *s, const lathe_loop *loop, double tolerance) {
@@ -67,7 +70,8 @@ static lathe_status mark_meetings(section *s, bool *found) {
     lathe_range *ranges = LATHE_NEW(s->arena, lathe_range, s->count);
     lathe_grid grid;
     if (!ranges) return LATHE_ERR_MEMORY;
-    for (uint32_t i = 0; i < s->count; i++) ranges[i] = lathe__range_of(s->loops->points[s->pieces[i].from], s->loops->points[s->pieces[i].to]);
+    for (uint32_t i = 0; i < s->count; i++)
+        ranges[i] = lathe__range_of(s->loops->points[s->pieces[i].from], s->loops->points[s->pieces[i].to]);
     lathe_status status = lathe__grid_build(&grid, s->arena, ranges, s->count, 4 * (uint64_t)s->count);
     if (status) return status;
     size_t cells = lathe__cell_at(&grid, grid.cells.x1, grid.cells.y1) + 1;
@@ -86,7 +90,8 @@ static bool cuts_off(const section *s, const piece *p, lathe_point at) {
     bool odd = false;
     for (uint32_t u = p->to, v = p->from;; u = v, v = after(&s->loops->loops[p->loop], v)) {
         bool up = points[v].y > at.y;
-        if ((points[u].y > at.y) != up && lathe__orient(up ? points[u] : points[v], up ? points[v] : points[u], at) > 0) odd = !odd;
+        if ((points[u].y > at.y) != up && lathe__orient(up ? points[u] : points[v], up ? points[v] : points[u], at) > 0)
+            odd = !odd;
         if (v == p->to) return odd;
     }
 }
@@ -97,7 +102,8 @@ static void mark_steps(section *s, bool *found) {
         const lathe_loop *own = &s->loops->loops[p->loop];
         if (after(own, p->from) == p->to) continue;
         lathe_range box = lathe__range_of(s->loops->points[p->from], s->loops->points[p->to]);
-        for (uint32_t v = p->from; v != p->to; v = after(own, v)) lathe__range_add(&box, s->loops->points[v].x, s->loops->points[v].y);
+        for (uint32_t v = p->from; v != p->to; v = after(own, v))
+            lathe__range_add(&box, s->loops->points[v].x, s->loops->points[v].y);
         for (uint32_t l = 0; l < s->loops->loop_count && !p->split; l++) {
             lathe_point at = s->loops->points[s->loops->loops[l].first];
             if (l == p->loop || at.x < box.x0 || at.x > box.x1 || at.y < box.y0 || at.y > box.y1) continue;
@@ -117,6 +123,21 @@ static void mark_turned(section *s, bool *found) {
         }
         if (s->loops->loops[s->pieces[begin].loop].hole ? area < 0 : area > 0) continue;
         for (uint32_t i = begin; i < end; i++) s->pieces[i].split = *found = true;
+    }
+}
+
+/* A piece that was split is two chords, each of which may miss what the one chord did not; so may the chords of a loop
+ * that was left with two vertices. */
+static void mark_far(section *s, double tolerance, bool *found) {
+    const lathe_point *at = s->loops->points;
+    for (uint32_t i = 0; i < s->count; i++) {
+        piece *p = &s->pieces[i];
+        const lathe_loop *loop = &s->loops->loops[p->loop];
+        double from[2] = {at[p->from].x, at[p->from].y}, to[2] = {at[p->to].x, at[p->to].y};
+        for (uint32_t v = after(loop, p->from); v != p->to && !p->split; v = after(loop, v)) {
+            double here[2] = {at[v].x, at[v].y};
+            if (lathe__segment_distance(here, from, to) > tolerance) p->split = *found = true;
+        }
     }
 }
 
@@ -157,7 +178,8 @@ static lathe_status write_polygons(lathe_outline *out, lathe_arena *arena, const
     return LATHE_OK;
 }
 
-lathe_status lathe__strip_outline(lathe_outline *out, lathe_arena *arena, const lathe_outline *loops, int32_t tolerance) {
+lathe_status lathe__strip_outline(lathe_outline *out, lathe_arena *arena, const lathe_outline *loops,
+                                  int32_t tolerance) {
     lathe_arena scratch = {0}, round = {0};
     uint32_t n = loops->point_count;
     section s = {.loops = loops, .arena = &round};
@@ -182,6 +204,7 @@ lathe_status lathe__strip_outline(lathe_outline *out, lathe_arena *arena, const 
         list_pieces(&s);
         status = mark_meetings(&s, &found);
         lathe__arena_reset(&round);
+        if (!status && !found) mark_far(&s, tolerance, &found);
         if (!status && !found) mark_steps(&s, &found);
         if (!status && !found) mark_turned(&s, &found);
         if (!found || !expand(&s, turn > 20)) break;

@@ -1,6 +1,6 @@
-/* Williams' cone intersection (1978): seen from the start, the circle of radius tolerance about each point fills a cone; the next
- * point goes on with the run while it lies in the intersection of all cones, so that the line from the start to it meets every
- * circle. */
+/* Williams' cone intersection (1978): seen from the start, the circle of radius tolerance about each point fills a
+ * cone; the next point goes on with the run while it lies in the intersection of all cones, so that the line from
+ * the start to it meets every circle. */
 #include <math.h>
 #include "strip.h"
 

@@ -1,6 +1,6 @@
-/* The greedy tiling of Christiansen and Sederberg (1978): both polygons are mapped into one unit square (their bounding boxes
- * become it); from the closest pair of points on, the shorter of the two next diagonals is taken. O(a + b) after the closest
- * partner of a's first point is found. */
+/* The greedy tiling of Christiansen and Sederberg (1978): both polygons are mapped into one unit square (their
+ * bounding boxes become it); from the closest pair of points on, the shorter of the two next diagonals is taken. O(a
+ * + b) after the closest partner of a's first point is found. */
 #include <math.h>
 #include "sections.h"
 
@@ -38,7 +38,8 @@ lathe_status lathe__tile_christiansen(lathe_tiling *out, lathe_arena *arena, con
     uint32_t i = 0, j = t.start[1], done_a = 0, done_b = 0;
     for (uint32_t k = 0; k < t.count; k++) {
         uint32_t next_i = i + 1 < a_count ? i + 1 : 0, next_j = j + 1 < b_count ? j + 1 : 0;
-        bool first = done_b == b_count || (done_a < a_count && gap(&a[next_i], &sa, &b[j], &sb) <= gap(&a[i], &sa, &b[next_j], &sb));
+        bool first = done_b == b_count ||
+                     (done_a < a_count && gap(&a[next_i], &sa, &b[j], &sb) <= gap(&a[i], &sa, &b[next_j], &sb));
         t.steps[k] = first ? 1 : 2;
         if (first) i = next_i, done_a++;
         else j = next_j, done_b++;

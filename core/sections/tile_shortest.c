@@ -1,6 +1,6 @@
-/* One-to-one branching by shortest spans [P 3.4]: a moves so that the centroids lie above each other; from each point of a a list
- * of spans goes round both polygons, always taking the shorter of the two next spans; the list of least total length wins.
- * O(a * (a + b)): m lists of m + n spans each. */
+/* One-to-one branching by shortest spans [P 3.4]: a moves so that the centroids lie above each other; from each
+ * point of a a list of spans goes round both polygons, always taking the shorter of the two next spans; the list of
+ * least total length wins. O(a * (a + b)): m lists of m + n spans each. */
 #include <math.h>
 #include "sections.h"
 
@@ -32,7 +32,8 @@ static double follow(const strip *s, uint32_t i, uint32_t j, double most, uint8_
     double total = 0;
     for (uint32_t done_a = 0, done_b = 0; done_a + done_b < s->n + s->m && total <= most;) {
         uint32_t next_i = i + 1 < s->n ? i + 1 : 0, next_j = j + 1 < s->m ? j + 1 : 0;
-        double along_a = done_a < s->n ? span(s, next_i, j) : INFINITY, along_b = done_b < s->m ? span(s, i, next_j) : INFINITY;
+        double along_a = done_a < s->n ? span(s, next_i, j) : INFINITY,
+               along_b = done_b < s->m ? span(s, i, next_j) : INFINITY;
         bool first = along_a <= along_b;
         if (steps) steps[done_a + done_b] = first ? 1 : 2;
         if (first) i = next_i, done_a++;

@@ -1,7 +1,8 @@
-/* The tiling of least area: a shortest path in the toroidal graph of spans (Keppel 1975), found by the divide and conquer of Fuchs,
- * Kedem and Uselton (1977). Node (i, j) is the span a_i b_j; an edge to the right (i + 1) is a triangle on an edge of a, an edge
- * upwards (j + 1) one on an edge of b. A tiling is a path from (k, 0) to (k + a, b) for some k; shortest paths of different k do
- * not cross, so the path of the middle k need only be sought between those of its neighbours: O(a b log a) time. */
+/* The tiling of least area: a shortest path in the toroidal graph of spans (Keppel 1975), found by the divide and
+ * conquer of Fuchs, Kedem and Uselton (1977). Node (i, j) is the span a_i b_j; an edge to the right (i + 1) is a
+ * triangle on an edge of a, an edge upwards (j + 1) one on an edge of b. A tiling is a path from (k, 0) to (k + a,
+ * b) for some k; shortest paths of different k do not cross, so the path of the middle k need only be sought between
+ * those of its neighbours: O(a b log a) time. */
 #include <math.h>
 #include <string.h>
 #include "sections.h"
@@ -19,7 +20,8 @@ typedef struct graph {
 
 static double area(const lathe_point *p, double pz, const lathe_point *q, const lathe_point *r, double qz) {
     /* p in one plane, the edge q r in the other. */
-    double ux = (double)q->x - p->x, uy = (double)q->y - p->y, uz = qz - pz, vx = (double)r->x - p->x, vy = (double)r->y - p->y;
+    double ux = (double)q->x - p->x, uy = (double)q->y - p->y, uz = qz - pz, vx = (double)r->x - p->x,
+           vy = (double)r->y - p->y;
     double x = uz * (uy - vy), y = uz * (vx - ux), z = ux * vy - uy * vx;
     return sqrt(x * x + y * y + z * z) / 2;
 }

@@ -10,10 +10,12 @@ typedef struct grid {
     float *values;
 } grid;
 
-static int32_t centre_of(const grid *g, int axis, int32_t i) { return (int32_t)lround(g->origin[axis] + g->step[axis] * i); }
+static int32_t centre_of(const grid *g, int axis, int32_t i) {
+    return (int32_t)lround(g->origin[axis] + g->step[axis] * i);
+}
 
-/* Is the column at p within the triangle, seen along w? A column on an edge belongs to the triangle on one side of it: to that on the
- * left of the edge directed upwards (or, if level, to the left). */
+/* Is the column at p within the triangle, seen along w? A column on an edge belongs to the triangle on one side of
+ * it: to that on the left of the edge directed upwards (or, if level, to the left). */
 static bool column_meets(const lathe_point t[3], lathe_point p) {
     bool turned = lathe__orient(t[0], t[1], t[2]) < 0;
     for (int k = 0; k < 3; k++) {
@@ -57,15 +59,18 @@ static void add_triangle(grid *g, const int32_t (*at)[3], const uint32_t v[3]) {
             if (!column_meets(t, p)) continue;
             double height = 0;
             for (int k = 0; k < 3; k++)
-                height += (double)lathe__orient(p, t[(k + 1) % 3], t[(k + 2) % 3]) / (double)area * ((double)at[v[k]][2] - at[v[0]][2]);
+                height += (double)lathe__orient(p, t[(k + 1) % 3], t[(k + 2) % 3]) / (double)area *
+                          ((double)at[v[k]][2] - at[v[0]][2]);
             toggle(g, x, y, height + at[v[0]][2]);
         }
 }
 
-lathe_status lathe__voxelise(lathe_volume **out, const lathe_mesh *mesh, const lathe_transform *transform, double spacing, lathe_error *err) {
+lathe_status lathe__voxelise(lathe_volume **out, const lathe_mesh *mesh, const lathe_transform *transform,
+                             double spacing, lathe_error *err) {
     grid g = {.values = NULL};
     double low[3], spacings[3] = {spacing, spacing, spacing}, voxels = 1;
-    if (!(spacing > 0) || !isfinite(spacing)) return lathe_fail(err, LATHE_ERR_RANGE, "the spacing is not a positive number of mm");
+    if (!(spacing > 0) || !isfinite(spacing))
+        return lathe_fail(err, LATHE_ERR_RANGE, "the spacing is not a positive number of mm");
     for (int a = 0; a < 3; a++) {
         int32_t least = INT32_MAX, most = INT32_MIN;
         for (uint32_t v = 0; v < mesh->vertex_count; v++) {
@@ -77,7 +82,9 @@ lathe_status lathe__voxelise(lathe_volume **out, const lathe_mesh *mesh, const l
             return lathe_fail(err, LATHE_ERR_RANGE, "the lattice is turned against the world");
         g.step[a] = spacing / scale;
         double count = ceil(((double)most - least) / g.step[a]) + 2;
-        if (count > LATHE_MAX_DIM) return lathe_fail(err, LATHE_ERR_LIMIT, "more than %d voxels of %g mm along an axis", LATHE_MAX_DIM, spacing);
+        if (count > LATHE_MAX_DIM)
+            return lathe_fail(err, LATHE_ERR_LIMIT, "more than %d voxels of %g mm along an axis", LATHE_MAX_DIM,
+                              spacing);
         g.dims[a] = (int32_t)count;
         g.origin[a] = ((double)most + least) / 2 - g.step[a] * (count - 1) / 2;
         low[a] = scale * g.origin[a] + transform->m[a][3];
@@ -86,7 +93,8 @@ lathe_status lathe__voxelise(lathe_volume **out, const lathe_mesh *mesh, const l
     if (voxels > 1 << 28) return lathe_fail(err, LATHE_ERR_LIMIT, "more than 2^28 voxels of %g mm", spacing);
     g.values = calloc((size_t)voxels, sizeof *g.values);
     if (!g.values) return lathe_fail(err, LATHE_ERR_MEMORY, "out of memory");
-    for (uint32_t i = 0; i < mesh->triangle_count; i++) add_triangle(&g, (const int32_t(*)[3])mesh->lattice, mesh->triangles[i]);
+    for (uint32_t i = 0; i < mesh->triangle_count; i++)
+        add_triangle(&g, (const int32_t(*)[3])mesh->lattice, mesh->triangles[i]);
     lathe_status status = lathe_volume_wrap(out, g.dims, spacings, g.values, err);
     if (!status)
         for (int a = 0; a < 3; a++) (*out)->affine[a][3] = low[a];

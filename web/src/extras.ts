@@ -31,6 +31,8 @@ const NAMES: Record<string, string> = { f: 'FOR', b: 'BACK', u: 'UP', d: 'DOWN' 
 const cross = (a: Vector, b: Vector): Vector => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const dot = (a: Vector | number[], b: Vector | number[]) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
+interface GlbMesh { primitives: { attributes: Record<string, number>; indices: number }[]; extras?: { structure: number } }
+
 /** Meshes of a GLB as the viewer draws them, in mm: positions, normals with full openness, indices. */
 function readGlb(bytes: ArrayBuffer): Mesh[] {
     const view = new DataView(bytes), length = view.getUint32(12, true);
@@ -40,8 +42,7 @@ function readGlb(bytes: ArrayBuffer): Mesh[] {
         const offset = start + (part.byteOffset ?? 0) + (accessor.byteOffset ?? 0);
         return size > 1 ? new Float32Array(bytes.slice(offset, offset + accessor.count * size * 4)) : new Uint32Array(bytes.slice(offset, offset + accessor.count * 4));
     };
-    return json.meshes.map((mesh: { primitives: { attributes: Record<string, number>; indices: number }[] }, structure: number) => {
-        const { attributes, indices } = mesh.primitives[0];
+    return json.meshes.map(({ primitives: [{ attributes, indices }], extras }: GlbMesh) => {
         const at = array(attributes.POSITION, 3), normal = array(attributes.NORMAL, 3), corners = array(indices, 1);
         const vertices = at.length / 3, buffer = new ArrayBuffer(vertices * 20 + corners.length * 4);
         // Only the node turns y up and scales to metres: the meshes themselves are in mm along the scan's axes.
@@ -50,7 +51,8 @@ function readGlb(bytes: ArrayBuffer): Mesh[] {
         for (let i = 0; i < vertices; i++)
             for (let k = 0; k < 4; k++) shading[4 * i + k] = 32767 * (k < 3 ? normal[3 * i + k] : 1);
         new Uint32Array(buffer, vertices * 20).set(corners);
-        return { structure, level: -1, vertices, triangles: corners.length / 3, buffer };
+        // Structures that show nothing yet have no mesh: the place in the list says nothing.
+        return { structure: extras?.structure ?? 0, level: -1, vertices, triangles: corners.length / 3, buffer };
     });
 }
 
@@ -148,5 +150,6 @@ export function open({ model, camera, redraw, level, structure }: Hooks): Extras
         if (smoothBox.checked && smoothLevel >= 0 && smoothLevel !== level()) showSmooth().catch(fail);
     }
 
-    return { mesh: (i) => smooth[i], cut, paint };
+    // A page of one structure has that one only, whatever its number in the model is.
+    return { mesh: (i) => smooth.find((mesh) => structure || mesh.structure === i), cut, paint };
 }
