@@ -87,7 +87,8 @@ test('smooth surface, slice with its outline, edge types in colour', () => withF
             for (let i = 3; i < d.length; i += 4) n += d[i] > 0;
             return n;
         });
-        assert.ok(await painted() > 200, 'the outline is drawn');
+        for (let tries = 0; tries < 50 && (await painted()) <= 200; tries++) await page.waitForTimeout(100);
+        assert.ok((await painted()) > 200, 'the outline is drawn');
         await page.screenshot({ path: join(await screenshots(), 'slice.png') });
 
         await page.locator('#rays').selectOption('32');
