@@ -213,6 +213,19 @@ def against_mask(results, name):
         yield f"{name}, the same, one model for all masks", "", ratio(total, mask["together"]), None
 
 
+def off_hull(results):
+    """Ends of passes that lie above the lower convex hull of squared error over bytes: a client would rather stop before or behind them"""
+    found = {}
+    for name, r in results.items():
+        if r["kind"] != "folded": continue
+        points, hull = [(s["bytes"], s["rms"] ** 2) for s in r["stream"]], []
+        for x, y in points:
+            while len(hull) > 1 and (hull[-1][1] - hull[-2][1]) * (x - hull[-2][0]) >= (y - hull[-2][1]) * (hull[-1][0] - hull[-2][0]): hull.pop()
+            hull.append((x, y))
+        found[name] = len(points) - len(hull)
+    if found: yield "ends of passes off the convex hull of squared error over bytes", "0", listed(found, "d"), max(found.values()) == 0
+
+
 def overhead(results):
     found = {name: 100 * (r["levels"][-1]["stream_bytes"] / r["single_rate"] - 1) for name, r in results.items() if r.get("single_rate")}
     if found: yield "all levels against the last one coded at once, more bytes, %", "<= 3", listed(found, "+.1f"), max(found.values()) <= 3
@@ -283,6 +296,7 @@ def figures(results, wasm):
     for name in ("torso", "xcolumn"): yield from against_peer(results, name, (FINE,), 0.5)
     for name in ("ch2bet", "aal"): yield from against_mask(results, name)
     yield from overhead(results)
+    yield from off_hull(results)
     yield from largest_errors(results)
     yield from falling_bits(results)
     yield from star_bytes(results, "head", 900)
