@@ -102,6 +102,7 @@ void lathe__pyramid_plan(lathe_header *header, const double spacing[3], const in
     header->parameter_count = 2;
     for (uint32_t left = count; left;) {
         uint32_t done = count - left, passes = done == 0 ? 1 : done == 1 ? 2 : 3, code = 0;
+        if (passes > left) passes = left;
         for (uint32_t i = 0; i < passes; i++) code = code << 2 | (uint32_t)(axes[done + i] + 1);
         header->parameters[header->parameter_count++] = code;
         left -= passes;

@@ -1,136 +1,194 @@
-/* From a mask to a radius map: the outermost crossing on each ray of each slice's only loop. */
+/* From the loops of a tube to its radius map: the outermost crossing on each ray of each row's loop. */
 #include <math.h>
 #include <string.h>
 #include "centre.h"
 #include "radius_map.h"
 
+static const double FULL_TURN = 6.283185307179586;
+
 typedef struct fit {
     lathe_radius_map *map;
     lathe_arena *scratch;      /* of one row */
-    const lathe_mask *mask;
-    int fraction;
+    const lathe_row_loop *loops;
+    int32_t first;
+    bool hole;
     const lathe_grey *grey;    /* NULL: the outline is the truth */
+    double (*direction)[2];    /* of each ray, before its row's turn */
+    double back, area;         /* twice, lattice units squared */
 } fit;
-
-static lathe_status trace_row(lathe_outline *out, const fit *f, int32_t row) {
-    lathe_slice_view view = {.pixels = lathe__mask_slice(f->mask, row), .width = f->mask->size[0], .height = f->mask->size[1],
-                             .row_words = f->mask->row_words, .fraction = f->fraction};
-    int32_t *border;
-    lathe_status status = lathe__trace_outline(out, &border, f->scratch, &view);
-    return status ? status : out->loop_count == 1 && !out->loops[0].hole ? LATHE_OK : LATHE_ERR_EMPTY;
-}
 
 /* The ray of the last level that a vector's angle follows, turned back by the row's turn. */
 static double ray_position(const fit *f, int32_t row, double x, double y) {
-    double turned = atan2(y, x) / 6.283185307179586 - (double)f->map->turn * row / 65536;
+    double turned = atan2(y, x) / FULL_TURN - (double)f->map->turn * row / 65536;
     return (turned - floor(turned)) * f->map->rays;
 }
 
-/* Longest distance along each ray; counts how often the loop goes back on its way round: 0 for a star. */
-static double cast_row(int32_t *radius, const fit *f, const lathe_outline *outline, int32_t row, const int32_t centre[2]) {
-    uint32_t rays = f->map->rays, n = outline->point_count;
+/* Cosine and sine of a row's turn. */
+static void row_turn(double out[2], const fit *f, int32_t row) {
+    double angle = FULL_TURN * f->map->turn * row / 65536;
+    out[0] = cos(angle), out[1] = sin(angle);
+}
+
+static void ray_direction(double out[2], const fit *f, const double turn[2], uint32_t ray) {
+    const double *d = f->direction[ray];
+    out[0] = d[0] * turn[0] - d[1] * turn[1];
+    out[1] = d[1] * turn[0] + d[0] * turn[1];
+}
+
+/* How much of the loop goes back on its way round, as twice an area: 0 for a star. */
+static double goes_back(const lathe_row_loop *loop, const int32_t centre[2]) {
     double cx = centre[0] * 0.5 * LATHE_LATTICE_ONE, cy = centre[1] * 0.5 * LATHE_LATTICE_ONE, back = 0;
-    if (radius) memset(radius, 0, rays * sizeof *radius);
-    for (uint32_t i = 0; i < n; i++) {
-        lathe_point p = outline->points[i], q = outline->points[i + 1 < n ? i + 1 : 0];
-        double px = p.x - cx, py = p.y - cy, qx = q.x - cx, qy = q.y - cy;
-        double from = ray_position(f, row, px, py), to = ray_position(f, row, qx, qy), cross = px * qy - py * qx;
+    for (uint32_t i = 0; i < loop->count; i++) {
+        lathe_point p = loop->points[i], q = loop->points[i + 1 < loop->count ? i + 1 : 0];
+        double cross = (p.x - cx) * (q.y - cy) - (p.y - cy) * (q.x - cx);
         if (cross < 0) back -= cross;
+    }
+    return back;
+}
+
+/* The longest distance along each ray. */
+static void cast_row(int32_t *radius, const fit *f, int32_t row, const int32_t centre[2], const double turn[2]) {
+    const lathe_row_loop *loop = &f->loops[row];
+    uint32_t rays = f->map->rays, n = loop->count;
+    double cx = centre[0] * 0.5 * LATHE_LATTICE_ONE, cy = centre[1] * 0.5 * LATHE_LATTICE_ONE;
+    memset(radius, 0, rays * sizeof *radius);
+    double next = ray_position(f, row, loop->points[0].x - cx, loop->points[0].y - cy);
+    for (uint32_t i = 0; i < n; i++) {
+        lathe_point p = loop->points[i], q = loop->points[i + 1 < n ? i + 1 : 0];
+        double px = p.x - cx, py = p.y - cy, qx = q.x - cx, qy = q.y - cy;
+        double from = next, to = next = ray_position(f, row, qx, qy), cross = px * qy - py * qx;
         if (cross < 0 ? from < to : to < from) *(cross < 0 ? &from : &to) += rays;
         double low = cross < 0 ? to : from, high = cross < 0 ? from : to;
-        for (double ray = ceil(low); radius && ray <= high; ray++) {
+        for (double ray = ceil(low); ray <= high; ray++) {
             uint32_t index = (uint32_t)ray & (rays - 1);
-            double angle = 6.283185307179586 * (index / (double)rays + (double)f->map->turn * row / 65536);
-            double dx = cos(angle), dy = sin(angle), across = (qx - px) * dy - (qy - py) * dx;
+            double d[2];
+            ray_direction(d, f, turn, index);
+            double across = (qx - px) * d[1] - (qy - py) * d[0];
             double length = fabs(across) < 1e-9 ? hypot(px, py) : ((qx - px) * -py - (qy - py) * -px) / -across;
             int32_t r = (int32_t)lround(length * LATHE_RADIUS_ONE / LATHE_LATTICE_ONE);
             if (r > radius[index]) radius[index] = r;
         }
     }
-    return back;
 }
 
-static lathe_status middle(int32_t centre[2], const fit *f, const lathe_outline *outline) {
+static lathe_status middle(int32_t centre[2], const fit *f, int32_t row) {
     lathe_point c;
-    lathe_status status = lathe__loop_centre(&c, f->scratch, outline->points, outline->point_count);
+    lathe_status status = lathe__loop_centre(&c, f->scratch, f->loops[row].points, f->loops[row].count);
     centre[0] = (int32_t)lround(c.x * 2.0 / LATHE_LATTICE_ONE);
     centre[1] = (int32_t)lround(c.y * 2.0 / LATHE_LATTICE_ONE);
+    lathe__arena_reset(f->scratch);
     return status;
 }
 
-/* Where the grey values cross iso near a radius that the mask's outline has, radius units. */
-static int32_t grey_radius(const fit *f, int32_t row, const int32_t centre[2], uint32_t ray, int32_t radius) {
-    double angle = 6.283185307179586 * (ray / (double)f->map->rays + (double)f->map->turn * row / 65536), near = radius / (double)LATHE_RADIUS_ONE;
-    double low = near > 1.5 ? near - 1.5 : 0, high = near + 1.5, value[2];
-    for (int turn = 0; turn < 12; turn++) {
-        double middle = turn == 0 ? low : turn == 1 ? high : (low + high) / 2;
-        double v = f->grey->value(f->grey->context, centre[0] * 0.5 + middle * cos(angle), centre[1] * 0.5 + middle * sin(angle), row) - f->grey->iso;
-        if (turn < 2) value[turn] = v;
-        if (turn == 1 && (value[0] < 0 || value[1] >= 0)) return radius;
-        if (turn > 1) *(v >= 0 ? &low : &high) = middle;
+static double depth(const fit *f, double u, double v, int32_t row) {
+    double d = f->grey->value(f->grey->context, u, v, f->first + row) - f->grey->iso;
+    return f->hole ? -d : d;
+}
+
+/* Where the grey values cross iso near a radius that the mask's outline has, radius units: from there half a pixel at a time until the
+ * crossing lies between, then the line between and halving in turn. */
+static int32_t grey_radius(const fit *f, int32_t row, const int32_t centre[2], const double d[2], int32_t radius) {
+    enum { REACH = 3, TURNS = 8 };
+    double low = radius / (double)LATHE_RADIUS_ONE, high = low, u = centre[0] * 0.5, v = centre[1] * 0.5;
+    double inside = depth(f, u + low * d[0], v + low * d[1], row), outside = inside;
+    for (int i = 0; inside < 0 && i < REACH && low > 0; i++) {
+        high = low, outside = inside;
+        low = low > 0.5 ? low - 0.5 : 0;
+        inside = depth(f, u + low * d[0], v + low * d[1], row);
     }
-    return (int32_t)lround((low + high) / 2 * LATHE_RADIUS_ONE);
+    for (int i = 0; outside >= 0 && i < REACH; i++) {
+        low = high, inside = outside;
+        high += 0.5;
+        outside = depth(f, u + high * d[0], v + high * d[1], row);
+    }
+    if (inside < 0 || outside >= 0) return radius;
+    for (int i = 0; i < TURNS && high - low > 1.0 / 256; i++) {
+        double at = i & 1 ? (low + high) / 2 : low + (high - low) * (inside / (inside - outside)), x = depth(f, u + at * d[0], v + at * d[1], row);
+        if (fabs(x) < (inside - outside) / 256) return (int32_t)lround(at * LATHE_RADIUS_ONE);
+        if (x >= 0) low = at, inside = x;
+        else high = at, outside = x;
+    }
+    return (int32_t)lround((low + (high - low) * (inside / (inside - outside))) * LATHE_RADIUS_ONE);
 }
 
 /* How far a cap rises where the grey values fall below iso above the centre, in eighths of a slice. */
 static int32_t grey_apex(const fit *f, int32_t row, int side) {
     const int32_t *c = f->map->centre[row];
     if (!f->grey) return LATHE_APEX_ONE / 2;
-    double in = f->grey->value(f->grey->context, c[0] * 0.5, c[1] * 0.5, row) - f->grey->iso;
-    double out = f->grey->value(f->grey->context, c[0] * 0.5, c[1] * 0.5, row + (side ? 1 : -1)) - f->grey->iso;
+    double in = depth(f, c[0] * 0.5, c[1] * 0.5, row), out = depth(f, c[0] * 0.5, c[1] * 0.5, row + (side ? 1 : -1));
     if (in < 0 || out >= 0) return LATHE_APEX_ONE / 2;
     int32_t apex = (int32_t)lround(in / (in - out) * LATHE_APEX_ONE);
     return apex < 1 ? 1 : apex > LATHE_APEX_ONE - 1 ? LATHE_APEX_ONE - 1 : apex;
 }
 
+static double doubled_area(const lathe_row_loop *loop) {
+    double area = 0;
+    for (uint32_t i = 0; i < loop->count; i++) {
+        lathe_point p = loop->points[i], q = loop->points[i + 1 < loop->count ? i + 1 : 0];
+        area += (double)p.x * q.y - (double)p.y * q.x;
+    }
+    return area;
+}
+
 /* between: where the centre would be for nothing, or NULL. It is taken unless the loop's own sees more of it. */
-static lathe_status fit_row(const fit *f, int32_t row, const int32_t *between) {
-    lathe_outline outline;
-    lathe_status status = trace_row(&outline, f, row);
+static lathe_status fit_row(fit *f, int32_t row, const int32_t *between) {
+    const lathe_row_loop *loop = &f->loops[row];
     int32_t *centre = f->map->centre[row], *radius = f->map->radius + (size_t)row * f->map->rays;
-    if (!status) status = middle(centre, f, &outline);
-    if (status) return status;
-    if (between && cast_row(NULL, f, &outline, row, between) <= cast_row(NULL, f, &outline, row, centre))
-        memcpy(centre, between, 2 * sizeof *centre);
-    cast_row(radius, f, &outline, row, centre);
+    double back = between ? goes_back(loop, between) : 1;
+    if (between) memcpy(centre, between, 2 * sizeof *centre);
+    if (back > 0) {
+        int32_t own[2];
+        lathe_status status = middle(own, f, row);
+        if (status) return status;
+        double own_back = goes_back(loop, own);
+        if (!between || own_back < back) memcpy(centre, own, sizeof own), back = own_back;
+    }
+    f->back += back;
+    f->area += doubled_area(loop);
+    double turn[2], d[2];
+    row_turn(turn, f, row);
+    cast_row(radius, f, row, centre, turn);
     for (uint32_t i = 0; i < f->map->rays; i++) {
-        if (f->grey) radius[i] = grey_radius(f, row, centre, i, radius[i]);
+        ray_direction(d, f, turn, i);
+        if (f->grey) radius[i] = grey_radius(f, row, centre, d, radius[i]);
         if (radius[i] < LATHE_RADIUS_LEAST) radius[i] = LATHE_RADIUS_LEAST;
     }
-    lathe__arena_reset(f->scratch);
     return LATHE_OK;
 }
 
-/* Rays about two voxels apart at the largest row. */
-static lathe_status choose_rays(lathe_radius_map *map, const fit *f) {
-    double most = 0;
+/* Rays about two voxels apart at the largest row: half of the box's diagonal is about as far as its loop reaches. */
+static void choose_rays(lathe_radius_map *map, const lathe_row_loop *loops) {
+    int64_t most = 0;
     for (int32_t row = 0; row < map->slices; row++) {
-        lathe_outline outline;
-        lathe_status status = trace_row(&outline, f, row);
-        if (status) return status;
-        int32_t c[2];
-        status = middle(c, f, &outline);
-        if (status) return status;
-        for (uint32_t i = 0; i < outline.point_count; i++) {
-            double r = hypot(outline.points[i].x - c[0] * 32768.0, outline.points[i].y - c[1] * 32768.0);
-            if (r > most) most = r;
+        lathe_point low = loops[row].points[0], high = low;
+        for (uint32_t i = 1; i < loops[row].count; i++) {
+            lathe_point p = loops[row].points[i];
+            if (p.x < low.x) low.x = p.x;
+            if (p.x > high.x) high.x = p.x;
+            if (p.y < low.y) low.y = p.y;
+            if (p.y > high.y) high.y = p.y;
         }
-        lathe__arena_reset(f->scratch);
+        int64_t wide = high.x - low.x, tall = high.y - low.y, reach = (wide > tall ? wide : tall) / 2;
+        if (reach > most) most = reach;
     }
-    uint32_t rays = lathe__choose_rays((int64_t)most, 1);
+    uint32_t rays = lathe__choose_rays(most, 1);
     map->rays = rays < 16 ? 16 : rays > LATHE_RADIUS_MAX_RAYS ? LATHE_RADIUS_MAX_RAYS : rays;
-    return LATHE_OK;
 }
 
-lathe_status lathe__radius_fit(lathe_radius_map *truth, lathe_arena *arena, lathe_arena *scratch, const lathe_mask *mask, int fraction,
-                               const lathe_grey *grey, uint32_t level_count, int32_t turn) {
-    lathe_radius_map map = {.slices = mask->size[2], .level_count = level_count, .turn = turn, .farthest = (mask->size[0] + mask->size[1]) * LATHE_RADIUS_ONE};
-    fit f = {.map = &map, .scratch = scratch, .mask = mask, .fraction = fraction, .grey = grey};
-    lathe_status status = choose_rays(&map, &f);
-    if (!status) status = lathe__radius_map_start(&map, arena);
-    int32_t last = map.slices - 1;
-    for (uint32_t level = 0; !status && level < level_count; level++) {
-        int32_t stride = (int32_t)1 << (level_count - 1 - level);
+lathe_status lathe__radius_fit(lathe_radius_map *map, lathe_arena *arena, lathe_arena *scratch, const lathe_row_loop *loops, int32_t first,
+                               bool hole, const lathe_grey *grey, double *back) {
+    fit f = {.map = map, .scratch = scratch, .loops = loops, .first = first, .hole = hole, .grey = grey};
+    choose_rays(map, loops);
+    lathe_status status = lathe__radius_map_start(map, arena);
+    int32_t last = map->slices - 1;
+    f.direction = lathe__arena_alloc(arena, map->rays, sizeof *f.direction);
+    if (!f.direction) return LATHE_ERR_MEMORY;
+    for (uint32_t i = 0; i < map->rays; i++) {
+        double angle = FULL_TURN * i / map->rays;
+        f.direction[i][0] = cos(angle), f.direction[i][1] = sin(angle);
+    }
+    for (uint32_t level = 0; !status && level < map->level_count; level++) {
+        int32_t stride = (int32_t)1 << (map->level_count - 1 - level);
         if (!level) {
             for (int32_t row = 0; !status && row < last; row += stride) status = fit_row(&f, row, NULL);
             if (!status) status = fit_row(&f, last, NULL);
@@ -138,11 +196,11 @@ lathe_status lathe__radius_fit(lathe_radius_map *truth, lathe_arena *arena, lath
         }
         for (int32_t row = stride; !status && row < last; row += 2 * stride) {
             int32_t low = row - stride, high = row + stride < last ? row + stride : last, between[2];
-            for (int k = 0; k < 2; k++) between[k] = lathe__centre_between(low, map.centre[low][k], high, map.centre[high][k], row);
+            for (int k = 0; k < 2; k++) between[k] = lathe__centre_between(low, map->centre[low][k], high, map->centre[high][k], row);
             status = fit_row(&f, row, between);
         }
     }
-    for (int side = 0; !status && side < 2; side++) map.apex[side] = grey_apex(&f, side ? last : 0, side);
-    if (!status) *truth = map;
+    for (int side = 0; !status && side < 2; side++) map->apex[side] = grey_apex(&f, side ? last : 0, side);
+    *back = f.area > 0 ? f.back / f.area : 1;
     return status;
 }

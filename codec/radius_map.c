@@ -9,20 +9,28 @@ static void start_model(lathe_number_model *m, uint32_t not_zero, uint32_t longe
     }
 }
 
-lathe_status lathe__radius_map_start(lathe_radius_map *map, lathe_arena *arena) {
+static lathe_status start_models(lathe_radius_map *map, lathe_arena *arena) {
     /* Of 256: a number is not zero, by how large its neighbours are. */
     static const uint8_t USUAL[LATHE_RADIUS_CLASSES] = {8, 24, 64, 100, 128, 154, 192, 216, 240};
+    lathe_radius_models *m = map->models = LATHE_NEW(arena, lathe_radius_models, 1);
+    if (!m) return LATHE_ERR_MEMORY;
+    start_model(&m->centres, 24, 77);
+    start_model(&m->starts, 200, 200);
+    for (int kind = 0; kind < LATHE_RADIUS_KINDS; kind++)
+        for (int i = 0; i < LATHE_RADIUS_CLASSES; i++) start_model(&m->radius[kind][i], kind ? USUAL[i] : 250, kind ? 77 : 180);
+    return LATHE_OK;
+}
+
+lathe_status lathe__radius_map_start(lathe_radius_map *map, lathe_arena *arena) {
     size_t samples = (size_t)map->slices * map->rays;
     if (samples > (size_t)1 << 24) return LATHE_ERR_LIMIT;
+    lathe_status status = map->models ? LATHE_OK : start_models(map, arena);
+    if (status) return status;
     map->centre = lathe__arena_alloc(arena, (size_t)map->slices, sizeof *map->centre);
     map->left = LATHE_NEW(arena, int8_t, samples);   /* before the larger array: blocks of an arena at least double */
     map->radius = LATHE_NEW(arena, int32_t, samples);
     if (!map->centre || !map->radius || !map->left) return LATHE_ERR_MEMORY;
     memset(map->left, 0, samples);
-    start_model(&map->centres, 24, 77);
-    for (int kind = 0; kind < LATHE_RADIUS_KINDS; kind++)
-        for (int i = 0; i < LATHE_RADIUS_CLASSES; i++)
-            start_model(&map->models[kind][i], kind ? USUAL[i] : 250, kind ? 77 : 180);
     return LATHE_OK;
 }
 
@@ -45,7 +53,7 @@ typedef struct walk {
 
 static int32_t *row_of(const walk *w, int32_t row) { return w->map->radius + (size_t)row * w->map->rays; }
 static int32_t size_at(const walk *w, int32_t row, uint32_t ray) {
-    int32_t v = w->map->left[(size_t)row * w->map->rays + (ray & w->mask)];
+    int32_t v = w->map->left ? w->map->left[(size_t)row * w->map->rays + (ray & w->mask)] : 0;
     return v < 0 ? -v : v;
 }
 
@@ -63,18 +71,19 @@ static bool code_radius(const walk *w, int kind, int32_t near, int32_t row, uint
     int class = 0;
     while (class < LATHE_RADIUS_CLASSES - 1 && near >= LIMITS[class]) class++;
     int32_t number = w->coder->truth ? quantise(w->coder->truth->radius[at] - predicted, w->step) : 0;
-    number = w->coder->code(w->coder->coder, &map->models[kind][class], number);
-    map->left[at] = (int8_t)(number > 127 ? 127 : number < -127 ? -127 : number);
+    number = w->coder->code(w->coder->coder, &map->models->radius[kind][class], number);
+    if (map->left) map->left[at] = (int8_t)(number > 127 ? 127 : number < -127 ? -127 : number);
     int64_t r = predicted + (int64_t)number * w->step;
-    if (r > map->farthest) return false;
+    if (r > map->farthest && !map->tube) return false;
+    if (r > map->farthest) r = map->farthest;
     map->radius[at] = r < LATHE_RADIUS_LEAST ? LATHE_RADIUS_LEAST : (int32_t)r;
     return true;
 }
 
-static bool code_centre(const walk *w, int32_t row, const int32_t predicted[2]) {
+static bool code_centre(const walk *w, int32_t row, const int32_t predicted[2], lathe_number_model *model) {
     for (int k = 0; k < 2; k++) {
         int32_t number = w->coder->truth ? w->coder->truth->centre[row][k] - predicted[k] : 0;
-        number = w->coder->code(w->coder->coder, &w->map->centres, number);
+        number = w->coder->code(w->coder->coder, model, number);
         if (number > 1 << 14 || number < -(1 << 14)) return false;
         w->map->centre[row][k] = predicted[k] + number;
     }
@@ -83,29 +92,42 @@ static bool code_centre(const walk *w, int32_t row, const int32_t predicted[2]) 
 
 /* Level 0: each row from the one before. */
 static bool code_first_row(const walk *w, int32_t row, int32_t before, uint32_t stride) {
-    static const int32_t origin[2] = {0, 0};
+    lathe_radius_map *map = w->map;
     int32_t *r = row_of(w, row), *b = before >= 0 ? row_of(w, before) : NULL;
-    if (!code_centre(w, row, b ? w->map->centre[before] : origin)) return false;
-    for (uint32_t i = 0; i < w->map->rays; i += stride) {
-        int32_t predicted = i ? r[i - stride] : b ? b[0] : 16 * LATHE_RADIUS_ONE;
+    if (!code_centre(w, row, b ? map->centre[before] : map->start, map->tube && !b ? &map->models->starts : &map->models->centres)) return false;
+    for (uint32_t i = 0; i < map->rays; i += stride) {
+        int32_t predicted = i ? r[i - stride] : b ? b[0] : map->start[2];
         if (i && b) predicted = (r[i - stride] + b[i] + b[i] - b[i - stride]) / 2;
         if (!code_radius(w, 0, 0, row, i, predicted)) return false;
     }
     return true;
 }
 
+/* Next to an end of a tube it is the squares that are linear, as on a ball. */
+static int32_t round_between(int32_t low, int64_t a, int32_t high, int64_t b, int32_t row) {
+    uint64_t square = (uint64_t)((a * a * (high - row) + b * b * (row - low)) / (high - low)), root = 0;
+    for (uint64_t bit = (uint64_t)1 << 31; bit; bit >>= 1)
+        if ((root | bit) * (root | bit) <= square) root |= bit;
+    return (int32_t)root;
+}
+
+/* Between b and c, of four in a row. */
+static int32_t between_four(int32_t a, int32_t b, int32_t c, int32_t d) { return (9 * (b + c) - a - d + 8) >> 4; }
+
 /* A new row between two known ones; those beyond are known, too, if they are as far away again. */
 static bool code_new_row(const walk *w, int32_t row, int32_t stride, uint32_t rays) {
     int32_t last = w->map->slices - 1, low = row - stride, high = row + stride < last ? row + stride : last, between[2];
     for (int k = 0; k < 2; k++)
         between[k] = lathe__centre_between(low, w->map->centre[low][k], high, w->map->centre[high][k], row);
-    if (!code_centre(w, row, between)) return false;
+    if (!code_centre(w, row, between, &w->map->models->centres)) return false;
     const int32_t *a = row_of(w, low), *b = row_of(w, high);
     bool cubic = low - 2 * stride >= 0 && high + 2 * stride <= last && high - row == stride;
     const int32_t *aa = cubic ? row_of(w, low - 2 * stride) : NULL, *bb = cubic ? row_of(w, high + 2 * stride) : NULL;
     int32_t below = row - 2 * stride;
     for (uint32_t i = 0; i < w->map->rays; i += rays) {
-        int32_t predicted = cubic ? (9 * (a[i] + b[i]) - aa[i] - bb[i] + 8) >> 4 : lathe__centre_between(low, a[i], high, b[i], row);
+        int32_t predicted = cubic         ? between_four(aa[i], a[i], b[i], bb[i])
+                            : w->map->tube ? round_between(low, a[i], high, b[i], row)
+                                           : lathe__centre_between(low, a[i], high, b[i], row);
         int32_t near = i ? 10 * size_at(w, row, i - rays) : 0;
         if (i > rays) near += 5 * size_at(w, row, i - 2 * rays);
         if (below >= 0) near += 10 * size_at(w, below, i) + 4 * size_at(w, below, i - rays) + 4 * size_at(w, below, i + rays);
@@ -118,7 +140,7 @@ static bool code_new_row(const walk *w, int32_t row, int32_t stride, uint32_t ra
 static bool code_new_rays(const walk *w, int32_t row, int32_t before, bool fresh, uint32_t stride) {
     const int32_t *r = row_of(w, row);
     for (uint32_t i = stride; i < w->map->rays; i += 2 * stride) {
-        int32_t predicted = (9 * (r[i - stride] + r[(i + stride) & w->mask]) - r[(i - 3 * stride) & w->mask] - r[(i + 3 * stride) & w->mask] + 8) >> 4;
+        int32_t predicted = between_four(r[(i - 3 * stride) & w->mask], r[i - stride], r[(i + stride) & w->mask], r[(i + 3 * stride) & w->mask]);
         int32_t near = i > stride ? 10 * size_at(w, row, i - 2 * stride) : 0;
         if (i > 3 * stride) near += 5 * size_at(w, row, i - 4 * stride);
         if (before >= 0) near += 10 * size_at(w, before, i) + 4 * size_at(w, before, i - 2 * stride) + 4 * size_at(w, before, i + 2 * stride);
@@ -128,9 +150,14 @@ static bool code_new_rays(const walk *w, int32_t row, int32_t before, bool fresh
     return true;
 }
 
+static int32_t step_of(const lathe_radius_map *map, uint32_t level) {
+    int32_t step = map->fine_step && level >= map->fine_from ? map->fine_step : map->step;
+    for (uint32_t l = level; l + 1 < map->level_count; l++) step = step > 3 ? (int32_t)((int64_t)step * map->fall / 8) : step;
+    return step;
+}
+
 lathe_status lathe__radius_walk(lathe_radius_map *map, uint32_t level, const lathe_number_coder *coder) {
-    walk w = {.map = map, .coder = coder, .step = map->step, .mask = map->rays - 1};
-    for (uint32_t l = level; l + 1 < map->level_count; l++) w.step = w.step > 3 ? w.step * 3 / 4 : w.step;
+    walk w = {.map = map, .coder = coder, .step = step_of(map, level), .mask = map->rays - 1};
     int32_t stride = (int32_t)1 << (map->level_count - 1 - level), last = map->slices - 1;
     uint32_t rays = lathe__radius_ray_stride(map, level);
     if (level == 0) {

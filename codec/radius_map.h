@@ -1,7 +1,7 @@
-/* The radius map: a structure that is one tube of star-shaped loops, as an image r(slice, ray). Refined dyadically in slices and in
- * rays: a new radius is predicted from known ones on both sides, what is left is quantised and coded. So that every sample stays
+/* The radius map: a tube of star-shaped loops, one in each of its slices, as an image r(slice, ray). Refined dyadically in slices and
+ * in rays: a new radius is predicted from known ones on both sides, what is left is quantised and coded. So that every sample stays
  * within half a step of the truth plus a dead zone, prediction sees what the decoder has (closed loop). Shared by both directions;
- * integers only. */
+ * integers only. radius_tubes.h makes structures of them. */
 #ifndef LATHE_RADIUS_MAP_H
 #define LATHE_RADIUS_MAP_H
 #include "base_shape.h"
@@ -13,21 +13,30 @@ enum {
     LATHE_APEX_ONE = 8
 };
 
+typedef struct lathe_radius_models {
+    lathe_number_model radius[LATHE_RADIUS_KINDS][LATHE_RADIUS_CLASSES], centres, starts;
+} lathe_radius_models;
+
 typedef struct lathe_radius_map {
     int32_t slices;            /* rows */
-    uint32_t level_count;
+    uint32_t level_count;      /* of the walk, one pass each; those of the structure only if the map is a simple one */
     uint32_t rays;             /* of the last level: a power of two, 8 to LATHE_RADIUS_MAX_RAYS */
-    int32_t step;              /* of the last level, radius units; three quarters of it for each level below */
+    int32_t step;              /* of the last level, radius units */
+    uint32_t fall;             /* eighths of it that each level below has */
+    uint32_t fine_from;        /* from this level on, steps fall towards lower ones from another one: */
+    int32_t fine_step;         /* 0: there is no such level */
+    bool tube;                 /* not a simple map: */
+    int32_t start[3];          /* what the first centre and the first radius are predicted to be */
     int32_t turn;              /* of a slice's rays against those of the slice below, 1/65536 of a full turn, counter-clockwise */
     int32_t apex[2];           /* how far the caps rise below the first and above the last slice, 1/8 of a slice: 1 to 7 */
     int32_t farthest;          /* largest radius allowed */
     int32_t (*centre)[2];      /* of a row, half pixels */
     int32_t *radius;           /* rays of each row, radius units */
-    int8_t *left;              /* what was left of each radius, in steps: contexts of later ones */
-    lathe_number_model models[LATHE_RADIUS_KINDS][LATHE_RADIUS_CLASSES], centres;
+    int8_t *left;              /* what was left of each radius, in steps: contexts of later ones; NULL: nothing is coded */
+    lathe_radius_models *models;
 } lathe_radius_map;
 
-/* Allocates the arrays and starts the models; slices, level_count, rays are set. Arena memory. LIMIT, MEMORY. */
+/* Allocates the arrays, and the models if there are none; slices, level_count, rays are set. Arena memory. LIMIT, MEMORY. */
 lathe_status lathe__radius_map_start(lathe_radius_map *map, lathe_arena *arena);
 
 /* Stride of a level's rays among those of the last. */
@@ -35,8 +44,9 @@ uint32_t lathe__radius_ray_stride(const lathe_radius_map *map, uint32_t level);
 
 /* One walk over the numbers of a level serves encoding and decoding. `code` gets the number that `truth` asks for and returns the
  * one that counts. truth: the map to be coded (encoder), or NULL. FORMAT: a number out of range. */
+typedef int32_t lathe_number_code(void *coder, lathe_number_model *model, int32_t number);
 typedef struct lathe_number_coder {
-    int32_t (*code)(void *coder, lathe_number_model *model, int32_t number);
+    lathe_number_code *code;
     void *coder;
     const lathe_radius_map *truth;
 } lathe_number_coder;
@@ -45,7 +55,8 @@ lathe_status lathe__radius_walk(lathe_radius_map *map, uint32_t level, const lat
 /* What a row's centre is predicted to be from two known ones; rows low < row < high. */
 int32_t lathe__centre_between(int32_t low, int32_t at_low, int32_t high, int32_t at_high, int32_t row);
 
-/* Where a ray of the last level ends, in lattice units. radius_mesh.c */
+/* radius_mesh.c: where a ray of the last level ends, in lattice units; with a centre and a radius of its own. */
+lathe_point lathe__radius_place(const lathe_radius_map *map, const int32_t centre[2], int32_t row, uint32_t ray, int32_t radius);
 lathe_point lathe__radius_point(const lathe_radius_map *map, int32_t row, uint32_t ray);
 /* The surface at a level: strips between the shown rows, ray by ray, and two fans. radius_mesh.c */
 lathe_status lathe__radius_mesh(lathe_mesh *out, const lathe_radius_map *map, uint32_t level);
@@ -57,8 +68,11 @@ typedef struct lathe_grey {
     double iso;
 } lathe_grey;
 
-/* radius_fit.c (encoder): the map of a mask whose every slice is one loop without holes; EMPTY if it is not such a mask.
- * grey: radii follow these values, or NULL: the mask's outline. turn: of the rays from slice to slice. */
-lathe_status lathe__radius_fit(lathe_radius_map *truth, lathe_arena *arena, lathe_arena *scratch, const lathe_mask *mask, int fraction,
-                               const lathe_grey *grey, uint32_t level_count, int32_t turn);
+/* radius_fit.c (encoder): one row of a tube: its loop, counter-clockwise. */
+typedef struct lathe_row_loop { const lathe_point *points; uint32_t count; } lathe_row_loop;
+/* The map of the loops of all rows: row 0 is slice `first`. slices, level_count, turn and farthest are set; rays are chosen. Arena
+ * memory. grey: radii follow these values, or NULL: the loops. hole: the values are inside where they are below iso.
+ * *back: how much of the loops turns back as seen from their centres, as a share of their area: 0 if all are stars. */
+lathe_status lathe__radius_fit(lathe_radius_map *map, lathe_arena *arena, lathe_arena *scratch, const lathe_row_loop *loops, int32_t first,
+                               bool hole, const lathe_grey *grey, double *back);
 #endif

@@ -1,19 +1,23 @@
 /* The surface of a radius map. Rays keep their directions from row to row (or turn evenly), so that a strip's triangles lie in
  * wedges about the line of centres that do not overlap: the surface cannot cross itself. */
 #include <stdlib.h>
-#include "radius_map.h"
+#include "radius_tubes.h"
 
 static int64_t squared(const int32_t *a, const int32_t *b) {
     int64_t x = a[0] - b[0], y = a[1] - b[1];
     return x * x + y * y;
 }
 
-lathe_point lathe__radius_point(const lathe_radius_map *map, int32_t row, uint32_t ray) {
+lathe_point lathe__radius_place(const lathe_radius_map *map, const int32_t centre[2], int32_t row, uint32_t ray, int32_t radius) {
     uint32_t turn = (uint32_t)map->turn * (uint32_t)row;
     lathe_point d = lathe__ray_direction((ray * (65536 / map->rays) + turn) & 65535, 65536);
-    int64_t length = (int64_t)map->radius[(size_t)row * map->rays + ray] * (LATHE_LATTICE_ONE / LATHE_RADIUS_ONE);
-    return (lathe_point){map->centre[row][0] * (LATHE_LATTICE_ONE / 2) + (int32_t)(length * d.x / LATHE_RAY_LENGTH),
-                         map->centre[row][1] * (LATHE_LATTICE_ONE / 2) + (int32_t)(length * d.y / LATHE_RAY_LENGTH)};
+    int64_t length = (int64_t)radius * (LATHE_LATTICE_ONE / LATHE_RADIUS_ONE);
+    return (lathe_point){centre[0] * (LATHE_LATTICE_ONE / 2) + (int32_t)(length * d.x / LATHE_RAY_LENGTH),
+                         centre[1] * (LATHE_LATTICE_ONE / 2) + (int32_t)(length * d.y / LATHE_RAY_LENGTH)};
+}
+
+lathe_point lathe__radius_point(const lathe_radius_map *map, int32_t row, uint32_t ray) {
+    return lathe__radius_place(map, map->centre[row], row, ray, map->radius[(size_t)row * map->rays + ray]);
 }
 
 static void place_row(lathe_mesh *mesh, const lathe_radius_map *map, int32_t row, uint32_t stride) {
@@ -54,23 +58,32 @@ static void add_cap(lathe_mesh *mesh, const lathe_radius_map *map, int side, uin
     }
 }
 
-lathe_status lathe__radius_mesh(lathe_mesh *out, const lathe_radius_map *map, uint32_t level) {
-    int32_t stride = (int32_t)1 << (map->level_count - 1 - level), last = map->slices - 1;
-    uint32_t ray_stride = lathe__radius_ray_stride(map, level), rays = map->rays / ray_stride;
-    size_t rows = (size_t)((last + stride - 1) / stride) + 1, vertices = rows * rays + 2, triangles = rows * rays * 2;
+lathe_status lathe__radius_strips(lathe_mesh *out, const lathe_radius_map *map, const int32_t *list, uint32_t rows, uint32_t stride) {
+    uint32_t rays = map->rays / stride;
+    size_t vertices = (size_t)rows * rays + 2, triangles = (size_t)rows * rays * 2;
     lathe_mesh mesh = {.lattice = malloc(vertices * sizeof *mesh.lattice), .triangles = malloc(triangles * sizeof *mesh.triangles)};
     if (!mesh.lattice || !mesh.triangles) {
         lathe_mesh_free(&mesh);
         return LATHE_ERR_MEMORY;
     }
-    for (int32_t row = 0;; row = row + stride < last ? row + stride : last) {
-        place_row(&mesh, map, row, ray_stride);
-        if (row) add_strip(&mesh, mesh.vertex_count - 2 * rays, mesh.vertex_count - rays, rays);
-        if (row == last) break;
+    for (uint32_t i = 0; i < rows; i++) {
+        place_row(&mesh, map, list[i], stride);
+        if (i) add_strip(&mesh, mesh.vertex_count - 2 * rays, mesh.vertex_count - rays, rays);
     }
     uint32_t top = mesh.vertex_count - rays;
     add_cap(&mesh, map, 0, 0, rays);
     add_cap(&mesh, map, 1, top, rays);
     *out = mesh;
     return LATHE_OK;
+}
+
+lathe_status lathe__radius_mesh(lathe_mesh *out, const lathe_radius_map *map, uint32_t level) {
+    int32_t stride = (int32_t)1 << (map->level_count - 1 - level), last = map->slices - 1, *rows = malloc((size_t)map->slices * sizeof *rows);
+    uint32_t count = 0;
+    if (!rows) return LATHE_ERR_MEMORY;
+    for (int32_t row = 0; row < last; row += stride) rows[count++] = row;
+    rows[count++] = last;
+    lathe_status status = lathe__radius_strips(out, map, rows, count, lathe__radius_ray_stride(map, level));
+    free(rows);
+    return status;
 }

@@ -44,9 +44,9 @@ static lathe_status encode_alone(lathe_packet_list packets[LATHE_MAX_LEVELS], co
     lathe_structure_state alone = {.mask = decoded->mask, .plan = decoded->plan, .fraction = decoded->fraction, .level = -1,
                                    .flags = decoded->flags & ~(uint32_t)LATHE_FLAG_SHARED, .exact_base = decoded->exact_base,
                                    .pyramid = decoded->pyramid};
-    lathe_radius_map map;
+    lathe_radii radii;
     lathe_status status = LATHE_OK;
-    if (decoded->radii) alone.radii = &map;
+    if (decoded->radii) alone.radii = &radii;
     else if (!alone.exact_base && !alone.pyramid) status = lathe__fit_stars(&alone, &arena[0]);
     for (uint32_t level = 0; !status && level < level_count; level++) {
         if (alone.pyramid) {

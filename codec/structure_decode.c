@@ -89,13 +89,12 @@ static int32_t get_number(void *coder, lathe_number_model *model, int32_t number
 }
 
 static lathe_status decode_radii(lathe_structure_state *state, lathe_range_decoder *d, uint32_t level) {
-    lathe_number_coder coder = {get_number, d, NULL};
-    lathe_status status = LATHE_OK;
     if (!level) {
-        state->radii = LATHE_NEW(&state->arena, lathe_radius_map, 1);
-        status = state->radii ? lathe__radius_head(state->radii, state, &state->arena, &coder) : LATHE_ERR_MEMORY;
+        state->radii = LATHE_NEW(&state->arena, lathe_radii, 1);
+        if (!state->radii) return LATHE_ERR_MEMORY;
+        *state->radii = lathe__radii_frame(state);
     }
-    if (!status) status = lathe__radius_walk(state->radii, level, &coder);
+    lathe_status status = lathe__radii_code(state->radii, NULL, &state->arena, level, get_number, d);
     return !status && d->overrun > 8 ? LATHE_ERR_FORMAT : status;
 }
 

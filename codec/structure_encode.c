@@ -124,10 +124,9 @@ static int32_t put_number(void *coder, lathe_number_model *model, int32_t number
     return number;
 }
 
-static lathe_status encode_radii(lathe_range_encoder *e, lathe_structure_state *state, const lathe_radius_map *truth, uint32_t level) {
-    lathe_number_coder coder = {put_number, e, truth};
-    lathe_status status = level ? LATHE_OK : lathe__radius_head(state->radii, state, &state->arena, &coder);
-    return status ? status : lathe__radius_walk(state->radii, level, &coder);
+static lathe_status encode_radii(lathe_range_encoder *e, lathe_structure_state *state, const lathe_radii *truth, uint32_t level) {
+    if (!level) *state->radii = lathe__radii_frame(state);
+    return lathe__radii_code(state->radii, truth, &state->arena, level, put_number, e);
 }
 
 static lathe_status encode_stars(lathe_range_encoder *e, lathe_structure_state *state, lathe_models *models) {

@@ -27,7 +27,7 @@ typedef struct lathe_baked_structure {
     lathe_level_info levels[LATHE_MAX_LEVELS];
     uint8_t *finer[LATHE_MAX_LEVELS]; /* of each level, if the topology is kept; owned */
     lathe_cap_list caps;
-    const lathe_radius_map *truth; /* of a radius map */
+    const lathe_radii *truth;  /* of radius maps */
     double area_mm2;           /* of the reference surface; 0 when nothing was measured */
 } lathe_baked_structure;
 void lathe__baked_free(lathe_baked_structure *baked);
@@ -43,8 +43,8 @@ lathe_status lathe__fit_stars(lathe_structure_state *state, lathe_arena *scratch
  * The state then builds the mesh of each level n (lathe__encoded_mesh). */
 lathe_status lathe__structure_encode_level(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2],
                                            lathe_models *models, uint32_t level, const lathe_encode_source *source);
-/* radius_choose.c: makes the state a radius map (state->radii, out->truth) if that is within 0.215 voxel RMS and 1 voxel anywhere, for
- * three quarters of the bytes of slices. After the plan. */
+/* radius_choose.c: makes the state radius maps (state->radii, out->truth) if that is within 0.22 voxel RMS and 1 voxel anywhere, for
+ * nine tenths of the bytes of slices. After the plan. */
 lathe_status lathe__choose_radii(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2], const lathe_volume *volume,
                                  lathe_axis axis, lathe_boundary boundary, const lathe_encode_source *source);
 /* pyramid_encode.c: one pass of a structure into its packet: level by level, pass by pass; with SHARED models structure by structure. */

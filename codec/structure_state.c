@@ -107,25 +107,6 @@ lathe_status lathe__state_estimate(lathe_structure_state *state, lathe_arena *sc
     return status;
 }
 
-/* ---- radius maps ---- */
-
-lathe_status lathe__radius_head(lathe_radius_map *map, const lathe_structure_state *state, lathe_arena *arena, const lathe_number_coder *coder) {
-    lathe_number_model m;
-    const lathe_radius_map *t = coder->truth;
-    lathe__number_start(&m, 1, LATHE_NUMBER_START);
-    int32_t log_rays = coder->code(coder->coder, &m, t ? __builtin_ctz(t->rays) - 6 : 0) + 6;
-    if (log_rays < 3 || log_rays > 10) return LATHE_ERR_FORMAT;
-    *map = (lathe_radius_map){.slices = state->plan.slices, .level_count = state->plan.level_count, .rays = 1u << log_rays,
-                              .farthest = (state->mask.size[0] + state->mask.size[1]) * LATHE_RADIUS_ONE};
-    map->step = coder->code(coder->coder, &m, t ? t->step : 0);
-    map->turn = coder->code(coder->coder, &m, t ? t->turn : 0);
-    for (int k = 0; k < 2; k++) map->apex[k] = coder->code(coder->coder, &m, t ? t->apex[k] - LATHE_APEX_ONE / 2 : 0) + LATHE_APEX_ONE / 2;
-    if (map->step < 1 || map->step > LATHE_RADIUS_MOST_STEP || map->turn < -32768 || map->turn > 32768) return LATHE_ERR_FORMAT;
-    for (int k = 0; k < 2; k++)
-        if (map->apex[k] < 1 || map->apex[k] >= LATHE_APEX_ONE) return LATHE_ERR_FORMAT;
-    return lathe__radius_map_start(map, arena);
-}
-
 static bool contains(const int32_t *list, uint32_t count, int32_t w) {
     uint32_t low = 0, high = count;
     while (low < high) {
@@ -210,13 +191,7 @@ lathe_status lathe__state_mesh(lathe_mesh *out, lathe_arena arena[2], const lath
     int32_t *slices;
     *counts = (lathe_surface_counts){0};
     if (!lathe__state_known(state)) return LATHE_ERR_RANGE;
-    if (state->radii) {
-        int32_t stride = lathe__level_stride(&state->plan, (uint32_t)state->level);
-        counts->rays = state->radii->rays / lathe__radius_ray_stride(state->radii, (uint32_t)state->level);
-        *shown = (uint32_t)((state->plan.slices - 1 + stride - 1) / stride) + 1;
-        counts->contour_vertices = (uint64_t)counts->rays * *shown;
-        return lathe__radius_mesh(out, state->radii, (uint32_t)state->level);
-    }
+    if (state->radii) return lathe__radii_mesh(out, arena, state->radii, (uint32_t)state->level, counts, shown);
     lathe_arena list = {0};
     lathe_status status = lathe__state_slices(&slices, shown, &list, state);
     if (!status) {

@@ -6,7 +6,7 @@
 #include "level.h"
 #include "occupancy.h"
 #include "pyramid.h"
-#include "radius_map.h"
+#include "radius_tubes.h"
 
 /* What adapts while packets are coded. One for a model if it is SHARED; else the occupancy is a template, and each structure starts
  * from it. */
@@ -34,7 +34,7 @@ typedef struct lathe_structure_state {
     lathe_mask lattice;        /* what is known, unless it is all */
     int32_t stride[3];         /* of the lattice */
     uint32_t pass;             /* passes known of level + 1 */
-    lathe_radius_map *radii;   /* in the arena: the structure is a radius map, and has neither mask nor base */
+    lathe_radii *radii;        /* in the arena: the structure is made of radius maps, and has neither mask nor base */
     lathe_range_decoder cap_code; /* the last packet from its caps on */
     uint8_t *cap_bytes;        /* in the arena; NULL: caps rise half a voxel */
     lathe_caps *caps;          /* instead of the code: an encoder's */
@@ -76,9 +76,13 @@ void lathe__mark_polygon(const lathe_mask *mask, int32_t slice, const lathe_poin
 void lathe__fill_slice(const lathe_mask *mask, int32_t slice);
 /* Fills `estimate` from the base shape. */
 lathe_status lathe__state_estimate(lathe_structure_state *state, lathe_arena *scratch);
-/* Numbers that a radius map begins with; encoder and decoder. */
-enum { LATHE_RADIUS_CHANCE = 1 << 13, LATHE_RADIUS_MOST_STEP = 1 << 16 };
-lathe_status lathe__radius_head(lathe_radius_map *map, const lathe_structure_state *state, lathe_arena *arena, const lathe_number_coder *coder);
+/* That a structure is made of radius maps, of 65536. */
+enum { LATHE_RADIUS_CHANCE = 1 << 13 };
+/* What is known of them before their first packet. */
+static inline lathe_radii lathe__radii_frame(const lathe_structure_state *state) {
+    return (lathe_radii){.slices = state->plan.slices, .width = state->mask.size[0], .height = state->mask.size[1],
+                         .level_count = state->plan.level_count};
+}
 
 /* pyramid_decode.c: one pass of level `level` (the state's level + 1, and its next pass). The level is the state's after its last one. */
 lathe_status lathe__pass_decode(lathe_structure_state *state, lathe_range_decoder *d, lathe_models *models, uint32_t level,

@@ -3,18 +3,20 @@
 #include "lathe_codec.h"
 #include "restream.h"
 
-/* A radius map has no pixels of its own: they are those within its polygons. */
+/* Radius maps have no pixels of their own: they are those within their polygons. */
 static void fill_from_radii(lathe_structure_state *s) {
-    const lathe_radius_map *map = s->radii;
     lathe_mask frame = s->mask;
-    lathe_point *polygon = malloc(map->rays * sizeof *polygon);
-    if (polygon && !lathe__mask_new(&s->mask, frame.size, frame.origin))
-        for (int32_t row = 0; row < map->slices; row++) {
-            for (uint32_t i = 0; i < map->rays; i++) polygon[i] = lathe__radius_point(map, row, i);
-            lathe__mark_polygon(&s->mask, row, polygon, map->rays);
-            lathe__fill_slice(&s->mask, row);
-        }
-    free(polygon);
+    lathe_arena arena = {0};
+    if (lathe__mask_new(&s->mask, frame.size, frame.origin)) return;
+    for (int32_t w = 0; w < s->radii->slices; w++) {
+        lathe_outline outline;
+        if (lathe__radii_outline(&outline, &arena, s->radii, s->radii->level_count - 1, w, 1, 0)) break;
+        for (uint32_t i = 0; i < outline.loop_count; i++)
+            lathe__mark_polygon(&s->mask, w, outline.points + outline.loops[i].first, outline.loops[i].count);
+        lathe__fill_slice(&s->mask, w);
+        lathe__arena_reset(&arena);
+    }
+    lathe__arena_free(&arena);
 }
 
 bool lathe_decoder_voxels(lathe_decoder *decoder, uint32_t structure, lathe_voxels *out) {

@@ -130,8 +130,27 @@ static void add_slices(digest *d, const lathe_structure_state *s, const int32_t 
     add(d, (uint32_t)(s->cap_code.end - s->cap_code.at)), add(d, s->cap_code.overrun);
 }
 
+/* Of each tube where it lies, and all that is shown of it. */
+static void add_tubes(digest *d, const lathe_structure_state *s) {
+    add(d, s->radii->count), add(d, (uint32_t)s->radii->step), add(d, s->radii->fine_level), add(d, (uint32_t)s->radii->fine_step);
+    for (uint32_t i = 0; i < s->radii->count; i++) {
+        lathe_radius_tube *tube = &s->radii->tubes[i];
+        lathe_radius_map m = lathe__tube_shown(tube, lathe__passes_at(s->radii, tube, (uint32_t)s->level));
+        add(d, (uint32_t)tube->first), add(d, tube->hole), add(d, (uint32_t)m.slices), add(d, m.rays), add(d, m.fall);
+        add(d, (uint32_t)m.turn), add(d, (uint32_t)m.apex[0]), add(d, (uint32_t)m.apex[1]);
+        for (int32_t row = 0; row < m.slices; row++) {
+            add(d, (uint32_t)m.centre[row][0]), add(d, (uint32_t)m.centre[row][1]);
+            for (uint32_t k = 0; k < m.rays; k++) add(d, (uint32_t)m.radius[(size_t)row * m.rays + k]);
+        }
+    }
+}
+
 static void add_radii(digest *d, const lathe_structure_state *s) {
-    const lathe_radius_map *m = s->radii;
+    if (!s->radii->simple) {
+        add_tubes(d, s);
+        return;
+    }
+    const lathe_radius_map *m = &s->radii->tubes[0].map;
     int32_t stride = lathe__level_stride(&s->plan, (uint32_t)s->level), last = m->slices - 1;
     uint32_t rays = lathe__radius_ray_stride(m, (uint32_t)s->level);
     add(d, m->rays), add(d, (uint32_t)m->step), add(d, (uint32_t)m->turn), add(d, (uint32_t)m->apex[0]), add(d, (uint32_t)m->apex[1]);
@@ -279,10 +298,15 @@ static lathe_decoder *decode_all(const uint8_t *bytes, size_t size) {
 static bool same_content(const lathe_structure_state *a, const lathe_structure_state *b) {
     if (a->level != b->level || a->fraction != b->fraction || !a->radii != !b->radii || !a->mask.bits != !b->mask.bits) return false;
     if (a->radii) {
-        size_t rows = (size_t)a->radii->slices, samples = rows * a->radii->rays;
-        return a->radii->rays == b->radii->rays && a->radii->turn == b->radii->turn && !memcmp(a->radii->apex, b->radii->apex, sizeof a->radii->apex) &&
-               !memcmp(a->radii->centre, b->radii->centre, rows * sizeof *a->radii->centre) &&
-               !memcmp(a->radii->radius, b->radii->radius, samples * sizeof *a->radii->radius);
+        if (a->radii->count != b->radii->count) return false;
+        for (uint32_t i = 0; i < a->radii->count; i++) {
+            const lathe_radius_map *p = &a->radii->tubes[i].map, *q = &b->radii->tubes[i].map;
+            size_t rows = (size_t)p->slices, samples = rows * p->rays;
+            if (p->slices != q->slices || p->rays != q->rays || p->turn != q->turn || memcmp(p->apex, q->apex, sizeof p->apex) ||
+                memcmp(p->centre, q->centre, rows * sizeof *p->centre) || memcmp(p->radius, q->radius, samples * sizeof *p->radius))
+                return false;
+        }
+        return true;
     }
     size_t bytes = lathe__mask_slice_words(&a->mask) * sizeof(uint64_t) * (size_t)a->mask.size[2];
     return a->mask.bits && !memcmp(a->mask.size, b->mask.size, sizeof a->mask.size) && !memcmp(a->mask.bits, b->mask.bits, bytes);

@@ -221,20 +221,18 @@ static void largest_radius_map(void) {
     enum { SLICES = LATHE_MAX_DIM, RAYS = LATHE_RADIUS_MAX_RAYS, LEVELS = 3 };
     lathe_header_structure one = box(80, 80, SLICES, LEVELS);
     lathe_arena arena = {0};
-    lathe_structure_state state = {.mask = {.size = {80, 80, SLICES}}, .plan = {.slices = SLICES, .level_count = LEVELS}};
-    lathe_radius_map truth = {.slices = SLICES, .level_count = LEVELS, .rays = RAYS, .step = 16, .apex = {4, 4}}, coded;
-    if (lathe__radius_map_start(&truth, &arena)) abort();
-    for (int32_t w = 0; w < SLICES; w++) truth.centre[w][0] = truth.centre[w][1] = 80;
-    for (size_t i = 0; i < (size_t)SLICES * RAYS; i++) truth.radius[i] = 1024;
+    lathe_radius_tube tube = {.map = {.slices = SLICES, .level_count = LEVELS, .rays = RAYS, .step = 16, .fall = 6, .apex = {4, 4}}};
+    lathe_radii truth = {.slices = SLICES, .width = 80, .height = 80, .level_count = LEVELS, .simple = true, .count = 1, .tubes = &tube}, coded = truth;
+    if (lathe__radius_map_start(&tube.map, &arena)) abort();
+    for (int32_t w = 0; w < SLICES; w++) tube.map.centre[w][0] = tube.map.centre[w][1] = 80;
+    for (size_t i = 0; i < (size_t)SLICES * RAYS; i++) tube.map.radius[i] = 1024;
     lathe_bytes stream = {0}, payload[LEVELS] = {{0}};
     emit_header(&stream, &one, 1, 0);
     for (uint32_t level = 0; level < LEVELS; level++) {
         lathe_range_encoder e;
         lathe__encoder_start(&e);
-        lathe_number_coder coder = {put, &e, &truth};
         if (!level) lathe__encode_bit(&e, LATHE_RADIUS_CHANCE, 1);
-        if (!level && lathe__radius_head(&coded, &state, &arena, &coder)) abort();
-        if (lathe__radius_walk(&coded, level, &coder)) abort();
+        if (lathe__radii_code(&coded, &truth, &arena, level, put, &e)) abort();
         lathe__encoder_finish(&e);
         lathe__emit(&payload[level], e.bytes, e.size);
         lathe__encoder_free(&e);

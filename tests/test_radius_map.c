@@ -5,6 +5,8 @@
 #include "check.h"
 #include "mesh.h"
 #include "radius_map.h"
+#include "radius_estimate.h"
+#include "radius_trace.h"
 
 static uint32_t seed = 7;
 static uint32_t next_random(void) {
@@ -54,6 +56,7 @@ static bool closed_ball(const lathe_mesh *mesh) {
 static size_t round_trip(const lathe_radius_map *truth, int32_t step, double *rms) {
     lathe_radius_map coded = *truth, decoded = *truth;
     size_t total = 0;
+    coded.models = decoded.models = NULL;
     if (lathe__radius_map_start(&coded, &arena) || lathe__radius_map_start(&decoded, &arena)) abort();
     coded.step = decoded.step = step;
     for (uint32_t level = 0; level < truth->level_count; level++) {
@@ -86,6 +89,17 @@ static size_t round_trip(const lathe_radius_map *truth, int32_t step, double *rm
     return total;
 }
 
+/* The map of a mask that is one tube; EMPTY if it is more. */
+static lathe_status fit_mask(lathe_radius_map *map, const lathe_mask *mask, uint32_t level_count, int32_t turn) {
+    lathe_traced_tubes traced;
+    lathe_status status = lathe__radius_trace(&traced, &arena, mask, 32);
+    double back;
+    if (status || traced.count != 1 || traced.tubes[0].rows != mask->size[2]) return status ? status : LATHE_ERR_EMPTY;
+    *map = (lathe_radius_map){.slices = mask->size[2], .level_count = level_count, .turn = turn, .fall = 6, .start = {0, 0, 1024},
+                              .farthest = (mask->size[0] + mask->size[1]) * LATHE_RADIUS_ONE};
+    return lathe__radius_fit(map, &arena, &scratch, traced.tubes[0].loops, 0, false, NULL, &back);
+}
+
 static void tubes(void) {
     for (int i = 0; i < 60; i++) {
         int slices = 1 + (int)(next_random() % 60);
@@ -93,8 +107,7 @@ static void tubes(void) {
         lathe_mask mask;
         lathe_radius_map truth;
         fill_mask(&mask, slices, size, bumps, twist);
-        lathe_status status = lathe__radius_fit(&truth, &arena, &scratch, &mask, 32, NULL, lathe__choose_levels(slices),
-                                                (int32_t)lround(twist * 65536 / 6.283185307179586));
+        lathe_status status = fit_mask(&truth, &mask, lathe__choose_levels(slices), (int32_t)lround(twist * 65536 / 6.283185307179586));
         if (!status) {
             double fine, coarse;
             size_t most = round_trip(&truth, 20, &fine), least = round_trip(&truth, 120, &coarse);
@@ -107,15 +120,205 @@ static void tubes(void) {
     }
 }
 
-static void not_tubes(void) {
-    int32_t dims[3] = {12, 12, 3}, origin[3] = {0, 0, 0};
+/* ---- several tubes ---- */
+
+static void set_pixel(lathe_mask *m, int32_t u, int32_t v, int32_t w) {
+    lathe__mask_slice(m, w)[(size_t)v * (size_t)m->row_words + (size_t)(u >> 6)] |= (uint64_t)1 << (u & 63);
+}
+
+enum { WIDE = 80, TALL = 50, FORKED = 44 };
+static bool in_disk(double x, double y, double r) { return x * x + y * y <= r * r; }
+/* A thick trunk; inside it, from slice 4 on, a round canal that parts into two at slice 20, which end at slices 35 and 39. */
+static bool in_fork(int32_t u, int32_t v, int32_t w) {
+    double x = u - 40, y = v - 25, apart = w < 20 ? 0 : (w - 19) * 1.1;
+    if (!(x * x / (34 * 34) + y * y / (21 * 21) <= 1)) return false;
+    if (w < 4) return true;
+    bool left = w <= 35 && in_disk(x + apart, y, 6), right = w <= 39 && in_disk(x - apart, y, 6);
+    return !left && !right;
+}
+
+static void fill_fork(lathe_mask *m) {
+    int32_t dims[3] = {WIDE, TALL, FORKED}, origin[3] = {0, 0, 0};
+    if (lathe__mask_new(m, dims, origin)) abort();
+    for (int32_t w = 0; w < FORKED; w++)
+        for (int32_t v = 1; v < TALL - 1; v++)
+            for (int32_t u = 1; u < WIDE - 1; u++)
+                if (in_fork(u, v, w)) set_pixel(m, u, v, w);
+}
+
+static void start_truth(lathe_radii *truth, const lathe_mask *mask, const lathe_traced_tubes *traced, int32_t step, uint32_t fine_level) {
+    *truth = (lathe_radii){.slices = mask->size[2], .width = mask->size[0], .height = mask->size[1], .level_count = lathe__choose_levels(mask->size[2]),
+                           .count = traced->count, .step = step, .fine_level = fine_level, .fine_step = step - 8};
+    truth->tubes = LATHE_NEW(&arena, lathe_radius_tube, traced->count);
+    memset(truth->tubes, 0, traced->count * sizeof *truth->tubes);
+    for (uint32_t i = 0; i < traced->count; i++) {
+        lathe_radius_tube *t = &truth->tubes[i];
+        double back;
+        t->first = traced->tubes[i].first;
+        t->hole = traced->tubes[i].hole;
+        t->map = (lathe_radius_map){.slices = traced->tubes[i].rows, .level_count = lathe__tube_passes(traced->tubes[i].rows, truth->level_count), .fall = 6,
+                                    .farthest = (WIDE + TALL) * LATHE_RADIUS_ONE};
+        CHECK(!lathe__radius_fit(&t->map, &arena, &scratch, traced->tubes[i].loops, t->first, t->hole, NULL, &back));
+    }
+}
+
+static void check_surface(const lathe_mesh *mesh) {
+    lathe_mesh_report r;
+    if (!CHECK(!lathe__mesh_check(&r, mesh, true))) return;
+    CHECK(!r.boundary_edges && !r.nonmanifold_edges && !r.misoriented_edges && !r.nonmanifold_vertices && !r.degenerate_triangles &&
+          !r.duplicate_positions && !r.self_intersections);
+    CHECK_EQ(r.components, 2);   /* the trunk, and the forked canal as a cavity */
+    CHECK_EQ(r.euler, 4);
+}
+
+static bool same_numbers(const int32_t *a, const int32_t *b, size_t count) { return !memcmp(a, b, count * sizeof *a); }
+
+/* Codes and decodes; every level closes, with the topology of the voxels; what both sides know is the same, and never worse than before. */
+static size_t fork_trip(const lathe_radii *truth) {
+    lathe_radii coded = {.slices = truth->slices, .width = truth->width, .height = truth->height, .level_count = truth->level_count}, decoded = coded;
+    lathe_radius_estimate estimate;
+    lathe_arena own = {0}, mesh_arena[2] = {{0}};
+    size_t total = 0;
+    double before = 1e9;
+    CHECK(!lathe__estimate_start(&estimate, &own, truth, 1));
+    for (uint32_t level = 0; level < truth->level_count; level++) {
+        lathe_range_encoder e;
+        lathe_range_decoder d;
+        lathe_surface_counts counts = {0};
+        lathe_mesh mesh = {0};
+        uint32_t shown;
+        double rms, most;
+        lathe__encoder_start(&e);
+        CHECK(!lathe__radii_code(&coded, truth, &own, level, put, &e));
+        lathe__encoder_finish(&e);
+        lathe__decoder_start(&d, e.bytes, e.size);
+        CHECK(!lathe__radii_code(&decoded, NULL, &own, level, get, &d));
+        CHECK(d.overrun <= 8);
+        total += e.size;
+        lathe__encoder_free(&e);
+        if (!CHECK(!lathe__radii_mesh(&mesh, mesh_arena, &decoded, level, &counts, &shown))) continue;
+        check_surface(&mesh);
+        lathe_mesh_free(&mesh);
+        CHECK(!lathe__estimate_error(&rms, &most, &estimate, &scratch, &decoded, level));
+        CHECK(rms < before * 1.02);
+        before = rms;
+    }
+    CHECK(before < 0.5);
+    CHECK_EQ(decoded.count, truth->count);
+    for (uint32_t i = 0; i < truth->count; i++) {
+        const lathe_radius_tube *a = &coded.tubes[i], *b = &decoded.tubes[i];
+        CHECK_EQ(b->first, truth->tubes[i].first);
+        CHECK_EQ(b->hole, truth->tubes[i].hole);
+        CHECK(same_numbers(a->map.radius, b->map.radius, (size_t)a->map.slices * a->map.rays));
+        CHECK(same_numbers(a->map.centre[0], b->map.centre[0], 2 * (size_t)a->map.slices));
+    }
+    lathe__arena_free(&own);
+    for (int i = 0; i < 2; i++) lathe__arena_free(&mesh_arena[i]);
+    return total;
+}
+
+static void forks(void) {
     lathe_mask mask;
-    lathe_radius_map truth;
-    if (lathe__mask_new(&mask, dims, origin)) abort();
-    for (int w = 0; w < 3; w++) lathe__mask_slice(&mask, w)[3] = 0x06, lathe__mask_slice(&mask, w)[4] = 0x66;
-    CHECK_EQ(lathe__radius_fit(&truth, &arena, &scratch, &mask, 32, NULL, 2, 0), LATHE_ERR_EMPTY);   /* two loops in a slice */
+    lathe_traced_tubes traced;
+    lathe_radii truth;
+    fill_fork(&mask);
+    if (!CHECK(!lathe__radius_trace(&traced, &arena, &mask, 32)) || !CHECK_EQ(traced.count, 4)) return;
+    /* trunk, canal up to where its halves part (they are 6 wide: first apart when 1.1 (w - 19) > 6), two branches */
+    CHECK(!traced.tubes[0].hole && traced.tubes[0].first == 0 && traced.tubes[0].rows == FORKED);
+    CHECK(traced.tubes[1].hole && traced.tubes[1].first == 4);
+    int32_t parted = 4 + traced.tubes[1].rows, ends[2] = {0, 0};
+    CHECK(parted >= 25 && parted <= 27);
+    for (int i = 0; i < 2; i++) {
+        CHECK(traced.tubes[2 + i].hole && traced.tubes[2 + i].first == parted);
+        ends[i] = parted + traced.tubes[2 + i].rows - 1;
+    }
+    CHECK_EQ(ends[0] + ends[1], 35 + 39);
+    start_truth(&truth, &mask, &traced, 24, 0);
+    size_t fine = fork_trip(&truth);
+    start_truth(&truth, &mask, &traced, 24, 2);
+    size_t finer = fork_trip(&truth);
+    start_truth(&truth, &mask, &traced, 30, 0);
+    CHECK(fork_trip(&truth) < fine && fine < finer);
     lathe__mask_free(&mask);
-    lathe__arena_reset(&scratch);
+    lathe__arena_reset(&arena);
+}
+
+/* Two squares, the second a hole or not: half sides a and b, the second's centre shifted. */
+static bool squares_fit(int32_t a, int32_t b, int32_t shift, bool hole) {
+    lathe_point points[8];
+    lathe_loop loops[2] = {{.first = 0, .count = 4}, {.first = 4, .count = 4, .hole = hole}};
+    lathe_outline outline = {.point_count = 8, .loop_count = 2, .points = points, .loops = loops};
+    static const int32_t SIGN[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
+    for (int i = 0; i < 4; i++) {
+        points[i] = (lathe_point){SIGN[i][0] * a, SIGN[i][1] * a};
+        points[4 + i] = (lathe_point){shift + SIGN[hole ? 3 - i : i][0] * b, SIGN[hole ? 3 - i : i][1] * b};
+    }
+    return lathe__loops_fit(&outline);
+}
+
+static void loops_fit(void) {
+    CHECK(squares_fit(1000, 400, 0, true));      /* a hole in a square */
+    CHECK(!squares_fit(1000, 400, 0, false));    /* a square in a square */
+    CHECK(!squares_fit(1000, 400, 2000, true));  /* a hole in nothing */
+    CHECK(squares_fit(1000, 400, 2000, false));  /* side by side */
+    CHECK(!squares_fit(1000, 400, 700, true));   /* across its rim */
+    CHECK(!squares_fit(1000, 400, 1300, false));
+    CHECK(!squares_fit(1000, 400, 600, true));   /* touching it */
+    CHECK(!squares_fit(400, 1000, 0, true));     /* inside out */
+}
+
+/* What is too many tubes is told without fitting any. */
+static void too_many(void) {
+    int32_t dims[3] = {64, 8, 3}, origin[3] = {0, 0, 0};
+    lathe_mask mask;
+    lathe_traced_tubes traced;
+    for (int loops = LATHE_TUBES_MOST; loops <= LATHE_TUBES_MOST + 1; loops++) {
+        if (lathe__mask_new(&mask, dims, origin)) abort();
+        for (int32_t w = 0; w < 3; w++)
+            for (int32_t i = 0; i < loops; i++)
+                for (int32_t k = 0; k < 9; k++) set_pixel(&mask, 2 + 6 * i + k % 3, 2 + k / 3, w);
+        CHECK_EQ(lathe__radius_trace(&traced, &arena, &mask, 32), loops > LATHE_TUBES_MOST ? LATHE_ERR_EMPTY : LATHE_OK);
+        lathe__mask_free(&mask);
+    }
+    lathe__arena_reset(&arena);
+}
+
+/* Numbers that no encoder would send: the head's are small, so that many get through; then any. */
+static int32_t wild(void *coder, lathe_number_model *model, int32_t number) {
+    int *count = coder;
+    (void)model, (void)number;
+    if (!(*count)++) return 5;   /* tubes */
+    if (*count < 40) return next_random() % 4 ? 0 : (int32_t)(next_random() % 6) - 1;
+    return next_random() % 3 ? 0 : next_random() % 20 ? (int32_t)(next_random() % 41) - 20 : (int32_t)(next_random() % (1 << 20)) - (1 << 19);
+}
+
+/* They end, and their surfaces, however their polygons lie, have no open edge. */
+static void hostile_tubes(void) {
+    lathe_arena own = {0}, mesh_arena[2] = {{0}};
+    int made = 0;
+    for (int i = 0; i < 60; i++) {
+        lathe_radii radii = {.slices = 1 + (int32_t)(next_random() % 30), .width = 3 + (int32_t)(next_random() % 60), .height = 3 + (int32_t)(next_random() % 60),
+                             .level_count = 2 + next_random() % 4};
+        lathe_status status = LATHE_OK;
+        int count = 0;
+        for (uint32_t level = 0; !status && level < radii.level_count; level++) {
+            lathe_surface_counts counts = {0};
+            lathe_mesh mesh = {0};
+            lathe_mesh_report r;
+            uint32_t shown;
+            status = lathe__radii_code(&radii, NULL, &own, level, wild, &count);
+            if (status) break;
+            made++;
+            if (!CHECK(!lathe__radii_mesh(&mesh, mesh_arena, &radii, level, &counts, &shown))) continue;
+            if (mesh.triangle_count) CHECK(!lathe__mesh_check(&r, &mesh, false) && !r.boundary_edges && !r.bad_indices);
+            lathe_mesh_free(&mesh);
+        }
+        CHECK(!status || status == LATHE_ERR_FORMAT);
+        lathe__arena_reset(&own);
+    }
+    CHECK(made > 20);
+    lathe__arena_free(&own);
+    for (int i = 0; i < 2; i++) lathe__arena_free(&mesh_arena[i]);
 }
 
 static void hostile(void) {
@@ -124,7 +327,7 @@ static void hostile(void) {
         size_t size = next_random() % sizeof bytes;
         for (size_t k = 0; k < size; k++) bytes[k] = (uint8_t)(next_random() % 3 ? next_random() : 255);
         lathe_radius_map map = {.slices = 1 + (int32_t)(next_random() % 40), .level_count = 2 + next_random() % 4,
-                                .rays = 8u << next_random() % 8, .step = 1 + (int32_t)(next_random() % 100000), .apex = {1, 7},
+                                .rays = 8u << next_random() % 8, .step = 1 + (int32_t)(next_random() % 100000), .fall = 6, .apex = {1, 7},
                                 .farthest = 1 << 19};
         if (lathe__radius_map_start(&map, &arena)) abort();
         lathe_range_decoder d;
@@ -144,7 +347,10 @@ static void hostile(void) {
 
 int main(void) {
     tubes();
-    not_tubes();
+    forks();
+    too_many();
+    loops_fit();
+    hostile_tubes();
     hostile();
     lathe__arena_free(&arena);
     lathe__arena_free(&scratch);

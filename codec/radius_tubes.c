@@ -1,0 +1,199 @@
+#include "radius_tubes.h"
+#include <string.h>
+
+/* Numbers of the head, each kind with its own context. */
+enum { HEAD_FORM, HEAD_COUNT, HEAD_STEP, HEAD_FALL, HEAD_FINE, HEAD_TURN, HEAD_APEX, HEAD_FIRST, HEAD_ROWS, HEAD_RAYS, HEAD_HOLE, HEAD_KINDS };
+enum { FORM_TUBES = 5, USUAL_STEP = 32, USUAL_FALL = 6, USUAL_LOG_RAYS = 6, MOST_SAMPLES = 1 << 22, MOST_STEP = 1 << 16 };
+
+typedef struct head {
+    lathe_radii *radii;
+    const lathe_radii *truth;
+    lathe_number_code *code;
+    void *coder;
+    lathe_number_model models[HEAD_KINDS];
+    lathe_radius_map common;   /* what all tubes share */
+} head;
+
+static void start_number(lathe_number_model *m, uint32_t not_zero, uint32_t longer) {
+    for (int k = 0; k < LATHE_NUMBER_MODELS; k++) {
+        uint32_t p = k == 0 ? not_zero : k >= 2 && k < 24 ? longer : 128;
+        m->bit[k] = (lathe_bit_model){(uint16_t)(p << 8), 2};
+    }
+}
+
+static int32_t number(head *h, int kind, int32_t usual, int32_t truth) {
+    return usual + h->code(h->coder, &h->models[kind], h->truth ? truth - usual : 0);
+}
+
+uint32_t lathe__tube_passes(int32_t rows, uint32_t level_count) {
+    uint32_t passes = 1;
+    while ((int32_t)1 << (passes - 1) < rows - 1) passes++;
+    return passes < level_count ? level_count : passes;
+}
+
+static lathe_status start_simple(head *h, lathe_arena *arena, int32_t form) {
+    lathe_radii *radii = h->radii;
+    lathe_radius_map *map = &radii->tubes[0].map;
+    const lathe_radius_map *t = h->truth ? &h->truth->tubes[0].map : NULL;
+    if (form < -3 || form > 4) return LATHE_ERR_FORMAT;
+    *map = (lathe_radius_map){.slices = radii->slices, .level_count = radii->level_count, .rays = 64u << (form + 3) >> 3, .fall = 6, .start = {0, 0, 16 * LATHE_RADIUS_ONE},
+                              .farthest = (radii->width + radii->height) * LATHE_RADIUS_ONE};
+    map->step = number(h, HEAD_FORM, 0, t ? t->step : 0);
+    map->turn = number(h, HEAD_FORM, 0, t ? t->turn : 0);
+    for (int k = 0; k < 2; k++) map->apex[k] = number(h, HEAD_FORM, LATHE_APEX_ONE / 2, t ? t->apex[k] : 0);
+    if (map->step < 1 || map->step > MOST_STEP || map->turn < -32768 || map->turn > 32768) return LATHE_ERR_FORMAT;
+    for (int k = 0; k < 2; k++)
+        if (map->apex[k] < 1 || map->apex[k] >= LATHE_APEX_ONE) return LATHE_ERR_FORMAT;
+    return lathe__radius_map_start(map, arena);
+}
+
+/* ---- the head of tubes ---- */
+
+/* 0: the slice that the tube before begins in; 1: the one above its end; n: n - 1 above its first. */
+static int32_t first_number(const lathe_radius_tube *tube, const lathe_radius_tube *before) {
+    int32_t from = before ? before->first : 0;
+    if (before && tube->first == from + before->map.slices) return 1;
+    return tube->first > from ? tube->first - from + 1 : 0;
+}
+
+static lathe_status code_tube(head *h, uint32_t index) {
+    lathe_radii *radii = h->radii;
+    lathe_radius_tube *tube = &radii->tubes[index], *before = index ? tube - 1 : NULL;
+    const lathe_radius_tube *t = h->truth ? &h->truth->tubes[index] : NULL;
+    int32_t from = before ? before->first : 0, n = number(h, HEAD_FIRST, 0, t ? first_number(t, t == h->truth->tubes ? NULL : t - 1) : 0);
+    if (n < 0 || n > radii->slices) return LATHE_ERR_FORMAT;
+    tube->first = n == 1 && before ? from + before->map.slices : n ? from + n - 1 : from;
+    int32_t least = radii->slices - tube->first, rows = least - number(h, HEAD_ROWS, 0, t ? least - t->map.slices : 0);
+    int32_t log_rays = number(h, HEAD_RAYS, before ? __builtin_ctz(before->map.rays) : USUAL_LOG_RAYS, t ? __builtin_ctz(t->map.rays) : 0);
+    int32_t hole = number(h, HEAD_HOLE, 0, t ? t->hole : 0);
+    if (rows < 1 || rows > least || log_rays < 3 || (uint32_t)1 << log_rays > (radii->count > 1 ? LATHE_TUBE_MOST_RAYS : LATHE_RADIUS_MAX_RAYS))
+        return LATHE_ERR_FORMAT;
+    tube->hole = hole != 0;
+    tube->map = h->common;
+    tube->map.slices = rows;
+    tube->map.level_count = lathe__tube_passes(rows, radii->level_count);
+    tube->map.rays = (uint32_t)1 << log_rays;
+    tube->map.fine_from = tube->map.level_count - radii->level_count + radii->fine_level;
+    return LATHE_OK;
+}
+
+/* Tubes share their contexts. */
+static lathe_status allocate(lathe_radius_tube *tube, lathe_arena *arena, lathe_radius_models *models) {
+    tube->map.models = models;
+    size_t samples = (size_t)tube->map.slices * tube->map.rays;
+    lathe_status status = lathe__radius_map_start(&tube->map, arena);
+    tube->shown = LATHE_NEW(arena, int32_t, samples);
+    tube->shown_centre = lathe__arena_alloc(arena, (size_t)tube->map.slices, sizeof *tube->shown_centre);
+    return status ? status : tube->shown && tube->shown_centre ? LATHE_OK : LATHE_ERR_MEMORY;
+}
+
+static lathe_status start_tubes(head *h, lathe_arena *arena) {
+    lathe_radii *radii = h->radii;
+    const lathe_radii *t = h->truth;
+    lathe_radius_map *common = &h->common;
+    const lathe_radius_map *truth = t ? &t->tubes[0].map : NULL;
+    int32_t count = number(h, HEAD_COUNT, 1, t ? (int32_t)t->count : 0), fall, samples = 0;
+    radii->step = number(h, HEAD_STEP, USUAL_STEP, t ? t->step : 0);
+    fall = number(h, HEAD_FALL, USUAL_FALL, truth ? (int32_t)truth->fall : 0);
+    int32_t fine = number(h, HEAD_FINE, 0, t ? (int32_t)t->fine_level : 0), finer = fine ? number(h, HEAD_STEP, 0, t ? t->step - t->fine_step : 0) : 0;
+    common->turn = number(h, HEAD_TURN, 0, truth ? truth->turn : 0);
+    for (int k = 0; k < 2; k++) common->apex[k] = number(h, HEAD_APEX, LATHE_APEX_ONE / 2, truth ? truth->apex[k] : 0);
+    if (count < 1 || count > LATHE_TUBES_MOST || radii->step < 0 || radii->step >= LATHE_TUBE_STEPS || fall < 3 || fall > 8 ||
+        fine < 0 || (uint32_t)fine >= radii->level_count || finer > radii->step || finer <= radii->step - LATHE_TUBE_STEPS || common->turn < -32768 || common->turn > 32768)
+        return LATHE_ERR_FORMAT;
+    for (int k = 0; k < 2; k++)
+        if (common->apex[k] < 1 || common->apex[k] >= LATHE_APEX_ONE) return LATHE_ERR_FORMAT;
+    common->tube = true;
+    common->step = lathe__tube_step(radii->step);
+    common->fall = (uint32_t)fall;
+    radii->fine_level = (uint32_t)fine;
+    radii->fine_step = radii->step - finer;
+    common->fine_step = fine ? lathe__tube_step(radii->fine_step) : 0;
+    common->farthest = (radii->width + radii->height) * LATHE_RADIUS_ONE;
+    radii->count = (uint32_t)count;
+    for (uint32_t i = 0; i < radii->count; i++) {
+        lathe_status status = code_tube(h, i);
+        if (status) return status;
+        int64_t more = (int64_t)radii->tubes[i].map.slices * radii->tubes[i].map.rays;
+        if (more > MOST_SAMPLES - samples) return LATHE_ERR_FORMAT;
+        samples += (int32_t)more;
+    }
+    for (uint32_t i = 0; i < radii->count; i++) {
+        lathe_status status = allocate(&radii->tubes[i], arena, radii->tubes[0].map.models);
+        if (status) return status;
+    }
+    return LATHE_OK;
+}
+
+static lathe_status code_head(lathe_radii *radii, const lathe_radii *truth, lathe_arena *arena, lathe_number_code *code, void *coder) {
+    head h = {.radii = radii, .truth = truth, .code = code, .coder = coder};
+    for (int k = 0; k < HEAD_KINDS; k++) start_number(&h.models[k], 128, 128);
+    radii->tubes = LATHE_NEW(arena, lathe_radius_tube, LATHE_TUBES_MOST);
+    if (!radii->tubes) return LATHE_ERR_MEMORY;
+    memset(radii->tubes, 0, LATHE_TUBES_MOST * sizeof *radii->tubes);
+    int32_t form = number(&h, HEAD_FORM, 0, !truth ? 0 : truth->simple ? __builtin_ctz(truth->tubes[0].map.rays) - 6 : FORM_TUBES);
+    radii->simple = form != FORM_TUBES;
+    radii->count = 1;
+    return radii->simple ? start_simple(&h, arena, form) : start_tubes(&h, arena);
+}
+
+/* ---- passes ---- */
+
+static int32_t nothing(void *coder, lathe_number_model *model, int32_t n) {
+    (void)coder, (void)model, (void)n;
+    return 0;
+}
+static const lathe_number_coder PREDICT = {nothing, NULL, NULL};
+
+/* A tube begins where the one that ends below it, the last such, had its centre; else where the tube before begins. */
+static void start_from(lathe_radius_tube *tube, const lathe_radii *radii) {
+    lathe_radius_map *map = &tube->map;
+    map->start[0] = radii->width - 1;
+    map->start[1] = radii->height - 1;
+    map->start[2] = map->farthest / 4;
+    if (tube == radii->tubes) return;
+    const lathe_radius_tube *near = tube - 1;
+    int32_t row = 0;
+    for (const lathe_radius_tube *t = radii->tubes; t < tube; t++)
+        if (t->hole == tube->hole && t->first + t->map.slices == tube->first) near = t, row = t->map.slices - 1;
+    memcpy(map->start, near->map.centre[row], sizeof *near->map.centre);
+    map->start[2] = near->map.radius[(size_t)row * near->map.rays] / 2;
+}
+
+/* Later passes touch no radius of earlier ones: what a lower level shows can be made again at any time. */
+lathe_radius_map lathe__tube_shown(lathe_radius_tube *tube, uint32_t passes) {
+    lathe_radius_map map = tube->map;
+    if (!tube->shown) return map;
+    map.radius = tube->shown, map.centre = tube->shown_centre, map.left = NULL;
+    if (passes > tube->passes) passes = tube->passes;
+    if (tube->shown_passes == passes) return map;
+    memcpy(tube->shown, tube->map.radius, (size_t)map.slices * map.rays * sizeof *tube->shown);
+    memcpy(tube->shown_centre, tube->map.centre, (size_t)map.slices * sizeof *tube->shown_centre);
+    for (uint32_t pass = passes; pass < map.level_count; pass++) (void)lathe__radius_walk(&map, pass, &PREDICT);   /* nothing can be out of range */
+    tube->shown_passes = passes;
+    return map;
+}
+
+static lathe_status code_tubes(lathe_radii *radii, const lathe_radii *truth, uint32_t level, lathe_number_code *code, void *coder) {
+    for (uint32_t i = 0; i < radii->count; i++) {
+        lathe_radius_tube *tube = &radii->tubes[i];
+        lathe_number_coder c = {code, coder, truth ? &truth->tubes[i].map : NULL};
+        uint32_t last = tube->map.level_count - radii->level_count + level, pass = level ? last : 0;
+        if (!level) start_from(tube, radii);
+        for (; pass <= last; pass++) {
+            lathe_status status = lathe__radius_walk(&tube->map, pass, &c);
+            if (status) return status;
+        }
+        tube->passes = pass;
+        tube->shown_passes = 0;
+    }
+    return LATHE_OK;
+}
+
+lathe_status lathe__radii_code(lathe_radii *radii, const lathe_radii *truth, lathe_arena *arena, uint32_t level, lathe_number_code *code,
+                               void *coder) {
+    lathe_status status = level ? LATHE_OK : code_head(radii, truth, arena, code, coder);
+    if (status) return status;
+    lathe_number_coder c = {code, coder, truth ? &truth->tubes[0].map : NULL};
+    return radii->simple ? lathe__radius_walk(&radii->tubes[0].map, level, &c) : code_tubes(radii, truth, level, code, coder);
+}

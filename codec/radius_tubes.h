@@ -1,0 +1,56 @@
+/* Structures as radius maps. A simple one is one map, its levels those of the structure. Else loops are grouped into tubes: in each of
+ * its slices a tube has one star-shaped loop; it ends where loops split, merge, appear or vanish. Each tube is a map, coded coarse to
+ * fine from its two ends on; what is not coded yet is shown as it is predicted. Decoder-safe. */
+#ifndef LATHE_RADIUS_TUBES_H
+#define LATHE_RADIUS_TUBES_H
+#include "level.h"
+#include "radius_map.h"
+
+enum { LATHE_TUBES_MOST = 8, LATHE_TUBE_STEPS = 80, LATHE_TUBE_MOST_RAYS = 256 };
+
+typedef struct lathe_radius_tube {
+    int32_t first;             /* the slice of row 0 */
+    bool hole;
+    lathe_radius_map map;      /* what has been coded */
+    int32_t *shown, (*shown_centre)[2];   /* the same with all rows and rays, see lathe__tube_show. Of a simple map: NULL */
+    uint32_t passes, shown_passes;        /* how many have been coded; of those that `shown` is made of, 0: none */
+} lathe_radius_tube;
+
+typedef struct lathe_radii {
+    int32_t slices, width, height;
+    uint32_t level_count;
+    bool simple;
+    uint32_t count;
+    int32_t step, fine_step;   /* index: lathe__tube_step; all tubes have these, and turn, fall and apex of the first */
+    uint32_t fine_level;       /* the first one with fine_step; 0: none */
+    lathe_radius_tube *tubes;
+} lathe_radii;
+
+/* Radius units: eight steps to each doubling. */
+static inline int32_t lathe__tube_step(int32_t index) { return (8 + (index & 7)) << (index >> 3); }
+/* How many passes a tube of some rows takes; the last level_count ones are the levels'. */
+uint32_t lathe__tube_passes(int32_t rows, uint32_t level_count);
+
+/* One packet, both directions; slices, width, height and level_count are set before level 0. truth: what is to be coded, or NULL.
+ * Arena memory with level 0. FORMAT: a number out of range. */
+lathe_status lathe__radii_code(lathe_radii *radii, const lathe_radii *truth, lathe_arena *arena, uint32_t level, lathe_number_code *code,
+                               void *coder);
+/* The passes that a tube has with a level. */
+static inline uint32_t lathe__passes_at(const lathe_radii *radii, const lathe_radius_tube *tube, uint32_t level) {
+    return tube->map.level_count - radii->level_count + level + 1;
+}
+/* A tube's map as it is shown with some passes coded: what is not coded is predicted, unless that has been done. */
+lathe_radius_map lathe__tube_shown(lathe_radius_tube *tube, uint32_t passes);
+
+/* radius_stack.c: the surface at a level that has been coded. arena: two scratch arenas, left reset. */
+lathe_status lathe__radii_mesh(lathe_mesh *out, lathe_arena arena[2], lathe_radii *radii, uint32_t level,
+                               lathe_surface_counts *counts, uint32_t *shown);
+/* The slices that a level shows, ascending, and the stride of its rays. Arena memory. Not of simple maps. */
+lathe_status lathe__radii_slices(int32_t **out, uint32_t *count, uint32_t *ray_stride, lathe_arena *arena, const lathe_radii *radii,
+                                 uint32_t level);
+/* The tubes' polygons in a slice at a level, every stride-th ray of the last level, at least 8 rays. Points get arena memory. */
+lathe_status lathe__radii_outline(lathe_outline *out, lathe_arena *arena, lathe_radii *radii, uint32_t level, int32_t slice,
+                                  uint32_t stride, uint32_t seed);
+/* radius_mesh.c: strips between rows of a map that reaches from the first slice to the last, and two fans. */
+lathe_status lathe__radius_strips(lathe_mesh *out, const lathe_radius_map *map, const int32_t *rows, uint32_t count, uint32_t stride);
+#endif
