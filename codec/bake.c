@@ -245,15 +245,39 @@ static lathe_status plan_pyramid(bake *b) {
     return status;
 }
 
+/* May be a radius map instead: then nothing of the pyramid stays but how many components there are. */
+static lathe_status plan_radii(bake *b) {
+    lathe_structure_state *state = &b->states[0];
+    lathe_baked_structure *baked = &b->baked[0];
+    grey_values grey;
+    lathe_encode_source source = source_of(b, &grey, &state->mask);
+    lathe_baked_structure rasters = *baked;
+    state->plan.level_count = baked->level_count = lathe__choose_levels(state->plan.slices);
+    baked->levels[baked->level_count - 1].components = rasters.levels[rasters.level_count - 1].components;
+    lathe_status status = lathe__choose_radii(baked, state, b->arena, b->volume, b->options->axis, b->boundary, &source);
+    if (!state->radii) {
+        *baked = rasters;
+        state->plan.level_count = baked->level_count;
+        return explain(b, 0, "planning", status);
+    }
+    state->pyramid = NULL;
+    state->flags = b->header.parameters[1] &= ~(uint32_t)LATHE_FLAG_PYRAMID;
+    b->header.parameter_count = b->header.parameters[1] ? 2 : 1;
+    b->header.structures[0].level_count = (uint8_t)baked->level_count;
+    return LATHE_OK;
+}
+
 static lathe_status plan(bake *b) {
+    const lathe_bake_options *o = b->options;
     lathe_status status = LATHE_OK;
-    bool keep = b->options->keep_topology, grey = b->boundary == LATHE_BOUNDARY_ISO && b->count == 1 && !b->options->exact && !b->options->levels;
+    bool slices = o->keep_topology || o->slices;
     for (size_t i = 0; !status && i < b->count; i++) {
         status = extract_structure(b, i);
-        if (!status && (keep || grey || b->options->slices)) status = plan_slices(b, i);
+        if (!status && slices) status = plan_slices(b, i);
         if (!status) status = tell(b, "planning", 0.2 * (double)(i + 1) / (double)b->count);
     }
-    return status || keep || b->options->slices || b->states[0].radii ? status : plan_pyramid(b);
+    if (!status && !slices) status = plan_pyramid(b);
+    return status || slices || o->structure_count || o->exact || o->levels ? status : plan_radii(b);
 }
 
 static lathe_status encode_structure(bake *b, size_t index, uint32_t level) {

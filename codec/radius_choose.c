@@ -74,6 +74,7 @@ typedef struct trial {
     double pixel, voxel;       /* pixel: in voxels; voxel: the smallest of its edges, mm */
     size_t borders, samples;   /* border edges of the mask; points of a measurement */
     double apart[LATHE_MAX_LEVELS];   /* what estimates leave out, squared: measured minus estimated */
+    double spacing[3];         /* of u, v, w, mm */
 } trial;
 
 typedef struct outcome {
@@ -298,26 +299,6 @@ static lathe_status check_levels(trial *t, const lathe_structure_state *state) {
     return status ? status : good ? LATHE_OK : LATHE_ERR_EMPTY;
 }
 
-/* What slices would cost, coded alone. */
-static lathe_status cost_of_slices(size_t *bytes, const lathe_structure_state *state, lathe_arena arena[2], const lathe_encode_source *source) {
-    lathe_structure_state alone = *state;
-    lathe_baked_structure packets = {.level_count = state->plan.level_count};
-    lathe_models models = {.widest = {3, 3}};
-    lathe_status status = LATHE_OK;
-    *bytes = 0;
-    alone.flags = state->flags & ~(uint32_t)LATHE_FLAG_SHARED;
-    alone.arena = (lathe_arena){0};   /* what is in the other one stays */
-    for (uint32_t level = 0; !status && level < packets.level_count; level++) {
-        status = lathe__structure_encode_level(&packets, &alone, arena, &models, level, source);
-        *bytes += packets.packets[level].size;
-    }
-    lathe__baked_free(&packets);
-    lathe__state_drop_occupancy(&alone);
-    lathe__arena_free(&alone.arena);
-    lathe__occupancy_free(&models.occupancy);
-    return status;
-}
-
 /* ---- from loops to maps ---- */
 
 static lathe_status fit_tubes(lathe_radii *truth, lathe_arena *arena, lathe_arena *scratch, const lathe_traced_tubes *traced,
@@ -373,23 +354,23 @@ static size_t count_borders(const lathe_mask *mask) {
     return borders;
 }
 
-/* The smoothest shapes' slices cost a quarter of a bit for each border edge, and their first bytes more. */
-static lathe_status earns_its_place(bool *good, size_t bytes, const trial *t, const lathe_structure_state *state, lathe_arena arena[2],
-                                    const lathe_encode_source *source) {
-    size_t slices = t->borders / 30 + 110;
-    lathe_status status = (double)bytes <= MOST_BYTES * (double)slices ? LATHE_OK : cost_of_slices(&slices, state, arena, source);
-    *good = (double)bytes <= MOST_BYTES * (double)slices;
+/* The smoothest shapes' rasters cost a quarter of a bit for each border edge, and their first bytes more. */
+static lathe_status earns_its_place(bool *good, size_t bytes, const trial *t, const lathe_structure_state *state) {
+    size_t rasters = t->borders / 30 + 110;
+    lathe_status status = LATHE_OK;
+    if ((double)bytes > MOST_BYTES * (double)rasters) status = lathe__pyramid_cost(&rasters, &state->mask, t->spacing);
+    *good = (double)bytes <= MOST_BYTES * (double)rasters;
     return status;
 }
 
-static lathe_status choose(trial *t, lathe_structure_state *state, lathe_arena arena[2], const lathe_encode_source *source) {
+static lathe_status choose(trial *t, const lathe_structure_state *state) {
     uint32_t level;
     size_t bytes = 0;
     bool good = true;
     lathe_status status = choose_step(&level, t);
     if (!status) status = choose_fine_step(&bytes, t, level);
     if (!status) status = check_levels(t, state);
-    if (!status) status = earns_its_place(&good, bytes, t, state, arena, source);
+    if (!status) status = earns_its_place(&good, bytes, t, state);
     return status ? status : good ? LATHE_OK : LATHE_ERR_EMPTY;
 }
 
@@ -403,6 +384,7 @@ lathe_status lathe__choose_radii(lathe_baked_structure *out, lathe_structure_sta
     const double *mm = volume->spacing;
     lathe__axis_frame(axis, frame);
     double least = fmin(mm[0], fmin(mm[1], mm[2])), pixel = sqrt(mm[frame[0]] * mm[frame[1]]);
+    for (int k = 0; k < 3; k++) t.spacing[k] = mm[frame[k]];
     t.pixel = pixel / least;
     t.voxel = least;
     t.borders = count_borders(&state->mask);
@@ -413,7 +395,7 @@ lathe_status lathe__choose_radii(lathe_baked_structure *out, lathe_structure_sta
     if (!status) status = fit_turned(&t, state, &arena[0], &traced, source, mm[frame[2]] / pixel);
     lathe__arena_free(&loops);
     if (!status) status = lathe__reference_build(&t.reference, volume, axis, &state->mask, boundary, source->iso);
-    if (!status) status = choose(&t, state, arena, source);
+    if (!status) status = choose(&t, state);
     lathe__reference_free(&t.reference);
     lathe__arena_reset(&arena[0]);
     for (int i = 0; i < 3; i++) lathe__arena_free(&trials[i]);

@@ -52,6 +52,8 @@ lathe_status lathe__pass_encode(lathe_range_encoder *e, lathe_structure_state *s
 /* Writes the schedule into the header's parameters from 2 on. Passes halve the longest stride; spacing: of the permuted axes, in mm;
  * most: voxels of the largest structure; levels: at most so many, 0: by the size. */
 void lathe__pyramid_plan(lathe_header *header, const double spacing[3], const int32_t most[3], uint32_t levels);
+/* Bytes of all passes of a mask as a model of its own. */
+lathe_status lathe__pyramid_cost(size_t *bytes, const lathe_mask *mask, const double spacing[3]);
 /* The mesh of a level, from the encoder's state. */
 lathe_status lathe__encoded_mesh(lathe_mesh *out, lathe_arena arena[2], lathe_structure_state *state, const lathe_baked_structure *baked,
                                  uint32_t level, lathe_surface_counts *counts, uint32_t *shown);
