@@ -1,18 +1,39 @@
 /* Draco deltas of a model: the levels up to the wanted one are built and walked one after another, because which vertices are
  * old, and where they lie, depends on all of them. */
-#include "draco_delta.h"
+#include "draco_rings.h"
 #include "restream.h"
 #include <stdlib.h>
 #include <string.h>
 
+void lathe__draco_rings_free(lathe_draco_rings *rings) {
+    for (uint32_t i = 0; i < rings->count; i++) {
+        free(rings->tubes[i].height);
+        free(rings->tubes[i].centre);
+        free(rings->tubes[i].radius);
+        free(rings->tubes[i].id);
+    }
+    free(rings->tubes);
+    *rings = (lathe_draco_rings){0};
+}
+
+void lathe__draco_shape_free(lathe_draco_shape *shape) {
+    free(shape->heights);
+    lathe__draco_rings_free(&shape->rings);
+    *shape = (lathe_draco_shape){0};
+}
+
 void lathe__draco_mesh_free(lathe_draco_mesh *mesh) {
     for (uint32_t i = 0; i < mesh->part_count; i++) {
+        lathe__draco_rings_free(&mesh->parts[i].rings);
+        lathe__draco_rings_free(&mesh->parts[i].form);
         free(mesh->parts[i].heights);
         free(mesh->parts[i].triangles);
         free(mesh->parts[i].contour);
     }
+    for (int k = 0; k < 2; k++) lathe__ranks_free(&mesh->ranks[k]);
     free(mesh->parts);
     free(mesh->at);
+    free(mesh->spare);
     free(mesh->next);
     *mesh = (lathe_draco_mesh){0};
 }
@@ -33,20 +54,13 @@ lathe_status lathe__draco_delta_apply(lathe_draco_mesh *mesh, const uint8_t *byt
 
 /* ---- a level's changed structures in one ---- */
 
-typedef struct level_mesh {
-    uint32_t vertex_count, triangle_count, vertex_room, triangle_room;
-    int32_t (*exact)[3];       /* of the volume's frame, lattice units */
-    int32_t *half;
-    uint32_t *part;
-    uint32_t (*triangles)[3];
-} level_mesh;
-
-static void free_level(level_mesh *level) {
+void lathe__draco_level_free(lathe_draco_level *level) {
     free(level->exact);
     free(level->half);
     free(level->part);
+    free(level->ring);
     free(level->triangles);
-    *level = (level_mesh){0};
+    *level = (lathe_draco_level){0};
 }
 
 static bool grow(void **array, size_t count, size_t size) {
@@ -55,7 +69,7 @@ static bool grow(void **array, size_t count, size_t size) {
     return more != NULL;
 }
 
-static lathe_status reserve(level_mesh *level, uint32_t vertices, uint32_t triangles) {
+static lathe_status reserve(lathe_draco_level *level, uint32_t vertices, uint32_t triangles) {
     uint64_t v = (uint64_t)level->vertex_count + vertices, t = (uint64_t)level->triangle_count + triangles;
     if (v > INT32_MAX / 3 || t > INT32_MAX / 3) return LATHE_ERR_LIMIT;
     bool good = true;
@@ -63,7 +77,8 @@ static lathe_status reserve(level_mesh *level, uint32_t vertices, uint32_t trian
         level->vertex_room = (uint32_t)(v + v / 2);
         good = grow((void **)&level->exact, level->vertex_room, sizeof *level->exact) &&
                grow((void **)&level->half, level->vertex_room, sizeof *level->half) &&
-               grow((void **)&level->part, level->vertex_room, sizeof *level->part);
+               grow((void **)&level->part, level->vertex_room, sizeof *level->part) &&
+               grow((void **)&level->ring, level->vertex_room, sizeof *level->ring);
     }
     if (good && t > level->triangle_room) {
         level->triangle_room = (uint32_t)(t + t / 2);
@@ -77,26 +92,52 @@ static int32_t half_of(const int32_t *slices, uint32_t count, int32_t w) {
     uint32_t low = 0, high = count;
     while (low < high) {
         uint32_t middle = (low + high) / 2;
-        if ((int64_t)slices[middle] * LATHE_LATTICE_ONE < w) low = middle + 1;
+        if ((int64_t)slices[middle] * (LATHE_LATTICE_ONE / 2) < w) low = middle + 1;
         else high = middle;
     }
-    bool shown = low < count && slices[low] * LATHE_LATTICE_ONE == w;
+    bool shown = low < count && slices[low] * (LATHE_LATTICE_ONE / 2) == w;
     return shown ? 2 * (int32_t)low : 2 * (int32_t)low - 1;
 }
 
-typedef struct place_of_box { const int32_t *origin, *slices; uint32_t slice_count, structure; bool mirrored; } place_of_box;
+/* Of a radius map's mesh: whose tube and ray the vertices are, slice by slice and tube by tube. False: it is another one. */
+static bool find_rings(uint32_t *ring, const lathe_mesh *mesh, const lathe_draco_shape *shape, const int32_t *origin) {
+    uint32_t row[LATHE_DRACO_TUBES] = {0}, v = 0;
+    for (uint32_t slice = 0; slice < shape->height_count; slice++)
+        for (uint32_t t = 0; t < shape->rings.count; t++) {
+            const lathe_draco_tube *tube = &shape->rings.tubes[t];
+            if (row[t] == tube->rows || tube->height[row[t]] != shape->heights[slice]) continue;
+            for (uint32_t k = 0; k < tube->rays; k++, v++) {
+                uint32_t ray = tube->clockwise ? tube->rays - 1 - k : k, at = row[t] * tube->rays + ray;
+                lathe_point p = lathe__draco_ring_point(tube->centre[row[t]], tube->radius[at], ray * (65536 / tube->rays), shape->turn,
+                                                        (tube->height[row[t]] - tube->height[0]) / 2);
+                if (v >= mesh->vertex_count || abs(p.x - mesh->lattice[v][0] - origin[0] * LATHE_LATTICE_ONE) > LATHE_LATTICE_ONE / 32 ||
+                    abs(p.y - mesh->lattice[v][1] - origin[1] * LATHE_LATTICE_ONE) > LATHE_LATTICE_ONE / 32 || at >> 28)
+                    return false;
+                ring[v] = t << 28 | at;
+            }
+            row[t]++;
+        }
+    return v > 0;
+}
 
-static lathe_status append(level_mesh *level, const lathe_mesh *mesh, const place_of_box *box) {
+lathe_status lathe__draco_level_add(lathe_draco_level *level, const lathe_mesh *mesh, uint32_t structure, lathe_draco_shape *shape,
+                                    const int32_t origin[3], bool mirrored) {
     lathe_status status = reserve(level, mesh->vertex_count, mesh->triangle_count);
     if (status) return status;
-    uint32_t base = level->vertex_count;
-    for (uint32_t i = 0; i < mesh->vertex_count; i++) {
-        level->half[base + i] = half_of(box->slices, box->slice_count, mesh->lattice[i][2]);
-        level->part[base + i] = box->structure;
-        for (int k = 0; k < 3; k++) level->exact[base + i][k] = mesh->lattice[i][k] + box->origin[k] * LATHE_LATTICE_ONE;
+    uint32_t *ring = level->ring + level->vertex_count;
+    memset(ring, 0xff, (size_t)mesh->vertex_count * sizeof *ring);
+    bool mapped = shape->rings.count && find_rings(ring, mesh, shape, origin), whole = true;
+    for (uint32_t i = 0, at = level->vertex_count; i < mesh->vertex_count; i++, at++) {
+        for (int k = 0; k < 3; k++) level->exact[at][k] = mesh->lattice[i][k] + origin[k] * LATHE_LATTICE_ONE;
+        level->half[at] = half_of(shape->heights, shape->height_count, level->exact[at][2]);
+        level->part[at] = structure;
+        whole = whole && (ring[i] == LATHE_DRACO_NONE) == (level->half[at] & 1);
     }
+    if (!mapped || !whole) lathe__draco_rings_free(&shape->rings);
+    for (uint32_t t = 0; t < shape->rings.count; t++) shape->rings.tubes[t].clockwise ^= mirrored;
     for (uint32_t t = 0; t < mesh->triangle_count; t++)
-        for (int k = 0; k < 3; k++) level->triangles[level->triangle_count + t][k] = base + mesh->triangles[t][box->mirrored && k ? 3 - k : k];
+        for (int k = 0; k < 3; k++)
+            level->triangles[level->triangle_count + t][k] = level->vertex_count + mesh->triangles[t][mirrored && k ? 3 - k : k];
     level->vertex_count += mesh->vertex_count;
     level->triangle_count += mesh->triangle_count;
     return LATHE_OK;
@@ -114,7 +155,7 @@ static lathe_status copy_triangles(lathe_draco_carrier *to, const void *triangle
 }
 
 /* In which order Draco gives vertices and triangles back: they are sent there and back with their numbers. */
-static lathe_status find_order(lathe_draco_carrier *back, const level_mesh *level) {
+static lathe_status find_order(lathe_draco_carrier *back, const lathe_draco_level *level) {
     lathe_draco_carrier there = {0};
     uint8_t *bytes = NULL;
     size_t size = 0;
@@ -129,7 +170,7 @@ static lathe_status find_order(lathe_draco_carrier *back, const level_mesh *leve
 }
 
 /* The level's vertices in Draco's order. *order: which they are in the level. */
-static lathe_status reorder(level_mesh *sorted, const level_mesh *level, const lathe_draco_carrier *back) {
+static lathe_status reorder(lathe_draco_level *sorted, const lathe_draco_level *level, const lathe_draco_carrier *back) {
     lathe_status status = reserve(sorted, level->vertex_count, 0);
     for (uint32_t v = 0; !status && v < level->vertex_count; v++) {
         uint32_t from = (uint32_t)back->value[0][v];
@@ -137,13 +178,14 @@ static lathe_status reorder(level_mesh *sorted, const level_mesh *level, const l
         memcpy(sorted->exact[v], level->exact[from], sizeof sorted->exact[v]);
         sorted->half[v] = level->half[from];
         sorted->part[v] = level->part[from];
+        sorted->ring[v] = level->ring[from];
     }
     sorted->vertex_count = level->vertex_count;
     return status;
 }
 
 /* Packs what the walk has made, in the order of the level, so that Draco turns it the same way again. */
-static lathe_status pack(uint8_t **out, size_t *size, const level_mesh *level, const lathe_draco_carrier *walked, const uint32_t *order,
+static lathe_status pack(uint8_t **out, size_t *size, const lathe_draco_level *level, const lathe_draco_carrier *walked, const uint32_t *order,
                          double *affine) {
     lathe_draco_carrier c = {0}, check = {0};
     lathe_status status = copy_triangles(&c, level->triangles, level->vertex_count, level->triangle_count);
@@ -163,21 +205,20 @@ static lathe_status pack(uint8_t **out, size_t *size, const level_mesh *level, c
     return status;
 }
 
-/* Moves the mesh to the level; out may be NULL. */
-static lathe_status write_delta(uint8_t **out, size_t *size, lathe_draco_mesh *mesh, const level_mesh *level,
-                                const struct lathe_draco_heights *heights, double *affine) {
+lathe_status lathe__draco_delta_write(uint8_t **out, size_t *size, lathe_draco_mesh *mesh, const lathe_draco_level *level,
+                                      const lathe_draco_shape *shapes, double *affine) {
     lathe_draco_carrier carrier = {0};
-    level_mesh sorted = {0};
+    lathe_draco_level sorted = {0};
     uint32_t *order = NULL;
     lathe_status status = find_order(&carrier, level);
     if (!status) status = reorder(&sorted, level, &carrier);
     if (!status && !(order = malloc(((size_t)level->vertex_count + 1) * sizeof *order))) status = LATHE_ERR_MEMORY;
     for (uint32_t v = 0; !status && v < level->vertex_count; v++) order[v] = (uint32_t)carrier.value[0][v];
-    lathe_draco_truth truth = {(const int32_t(*)[3])sorted.exact, sorted.half, sorted.part, heights};
+    lathe_draco_truth truth = {(const int32_t(*)[3])sorted.exact, sorted.half, sorted.part, sorted.ring, shapes};
     if (!status) status = lathe__draco_walk(mesh, &carrier, &truth);
     if (!status && out) status = pack(out, size, level, &carrier, order, affine);
     free(order);
-    free_level(&sorted);
+    lathe__draco_level_free(&sorted);
     lathe__draco_carrier_free(&carrier);
     return status;
 }
@@ -193,8 +234,8 @@ typedef struct delta_writer {
     uint32_t structure_count;
     lathe_draco_mesh mesh;
     lathe_mesh *latest;        /* of each structure, to see what changes */
-    struct lathe_draco_heights *heights; /* owned */
-    level_mesh level;
+    lathe_draco_shape *shapes; /* owned */
+    lathe_draco_level level;
     double affine[12];
 } delta_writer;
 
@@ -207,11 +248,11 @@ static int feed(void *context, const void *bytes, size_t size) {
 static void close_writer(delta_writer *d) {
     for (uint32_t i = 0; i < d->structure_count; i++) {
         if (d->latest) lathe_mesh_free(&d->latest[i]);
-        if (d->heights) free((void *)(uintptr_t)d->heights[i].at);
+        if (d->shapes) lathe__draco_shape_free(&d->shapes[i]);
     }
     free(d->latest);
-    free(d->heights);
-    free_level(&d->level);
+    free(d->shapes);
+    lathe__draco_level_free(&d->level);
     lathe__draco_mesh_free(&d->mesh);
     lathe_decoder_close(&d->decoder);
 }
@@ -244,36 +285,100 @@ static void set_affine(delta_writer *d, const lathe_transform *t, const int32_t 
     }
 }
 
+/* One tube of a radius map at a level, in its shown slices; a ray of the level is every stride-th. */
+static lathe_status take_tube(lathe_draco_tube *out, const lathe_draco_shape *shape, const lathe_radius_map *map, int32_t first, bool hole,
+                              const int32_t *origin, uint32_t stride) {
+    uint32_t rays = map->rays / stride;
+    *out = (lathe_draco_tube){.rays = rays, .clockwise = hole, .height = malloc(((size_t)shape->height_count + 1) * sizeof *out->height),
+                              .centre = malloc(((size_t)shape->height_count + 1) * sizeof *out->centre),
+                              .radius = malloc((size_t)shape->height_count * rays * sizeof *out->radius + 1)};
+    if (!out->height || !out->centre || !out->radius) return LATHE_ERR_MEMORY;
+    for (uint32_t i = 0; i < shape->height_count; i++) {
+        int32_t row = shape->heights[i] / 2 - origin[2] - first;
+        if (row < 0 || row >= map->slices) continue;
+        out->height[out->rows] = shape->heights[i];
+        for (int k = 0; k < 2; k++) out->centre[out->rows][k] = map->centre[row][k] + 2 * origin[k];
+        for (uint32_t r = 0; r < rays; r++)
+            out->radius[(size_t)out->rows * rays + r] = map->radius[(size_t)row * map->rays + (size_t)r * stride];
+        out->rows++;
+    }
+    return LATHE_OK;
+}
+
+/* The radius map of a level. What is not as the mesh has it is found out by lathe__draco_level_add. */
+static lathe_status take_rings(lathe_draco_shape *shape, lathe_radii *radii, const int32_t *origin, uint32_t level, uint32_t ray_stride) {
+    if (radii->count > LATHE_DRACO_TUBES) return LATHE_OK;
+    shape->rings.tubes = calloc(radii->count, sizeof *shape->rings.tubes);
+    if (!shape->rings.tubes) return LATHE_ERR_MEMORY;
+    for (uint32_t t = 0; t < radii->count; t++) {
+        lathe_radius_map map = lathe__tube_shown(&radii->tubes[t], lathe__passes_at(radii, &radii->tubes[t], level));
+        uint32_t stride = radii->simple ? lathe__radius_ray_stride(&map, level) : map.rays / ray_stride < 8 ? map.rays / 8 : ray_stride;
+        shape->rings.count++;
+        lathe_status status = take_tube(&shape->rings.tubes[t], shape, &map, radii->tubes[t].first, radii->tubes[t].hole, origin, stride);
+        if (status) return status;
+        shape->turn = map.turn;
+    }
+    return LATHE_OK;
+}
+
+/* What a lattice without a sample inside shows: an octahedron, with one slice in the middle of its box, which has no other there. */
+static bool is_octahedron(const lathe_structure_state *state, const lathe_mesh *mesh) {
+    int32_t middle = (state->mask.size[2] - 1) * (LATHE_LATTICE_ONE / 2);
+    if (!state->pyramid || mesh->vertex_count != 6 || mesh->triangle_count != 8) return false;
+    for (uint32_t v = 0; v < 4; v++)
+        if (mesh->lattice[v][2] != middle) return false;
+    return true;
+}
+
+/* The slices that a level shows, from the box's first; arena memory. *ray_stride: of a radius map that is not a simple one. */
+static lathe_status slices_of(int32_t **slices, uint32_t *count, uint32_t *ray_stride, lathe_arena *arena, const lathe_structure_state *state,
+                              uint32_t level) {
+    *ray_stride = 1;
+    if (state->radii && !state->radii->simple) return lathe__radii_slices(slices, count, ray_stride, arena, state->radii, level);
+    return state->radii ? lathe__level_slices(slices, count, arena, &state->plan, level) : lathe__state_slices(slices, count, arena, state);
+}
+
+/* What a structure that has come to a level shows: the one place that knows how levels are made. */
+static lathe_status shape_of(lathe_draco_shape *shape, const lathe_structure_state *state, const lathe_mesh *mesh, uint32_t level) {
+    lathe_arena arena = {0};
+    int32_t *slices;
+    uint32_t count = 0, ray_stride;
+    lathe_status status = slices_of(&slices, &count, &ray_stride, &arena, state, level);
+    *shape = (lathe_draco_shape){.height_count = count, .origin = {state->mask.origin[0], state->mask.origin[1]}};
+    if (!status && !(shape->heights = malloc(((size_t)count + 1) * sizeof *shape->heights))) status = LATHE_ERR_MEMORY;
+    for (uint32_t i = 0; !status && i < count; i++) shape->heights[i] = 2 * (slices[i] + state->mask.origin[2]);
+    if (!status && is_octahedron(state, mesh)) {
+        shape->height_count = 1;
+        shape->heights[0] = 2 * state->mask.origin[2] + state->mask.size[2] - 1;
+    }
+    lathe__arena_free(&arena);
+    if (!status && state->radii) status = take_rings(shape, state->radii, state->mask.origin, level, ray_stride);
+    for (int k = 0; k < 2 && state->pyramid && !state->radii; k++) shape->stride[k] = state->stride[k];
+    return status;
+}
+
 /* A structure has come to a level. */
 static lathe_status add_structure(delta_writer *d, uint32_t own, uint32_t structure, uint32_t level) {
     const lathe_mesh *mesh = lathe_decoder_mesh(d->decoder, own);
     if (!mesh) return LATHE_ERR_FORMAT;
     if (is_same(&d->latest[structure], mesh)) return LATHE_OK;
     lathe_status status = keep(&d->latest[structure], mesh);
-    if (status) return status;
     const lathe_structure_state *state = lathe__decoder_state(d->decoder, own);
     const lathe_transform *transform = lathe_decoder_transform(d->decoder, own);
     if (!d->mesh.level_count) set_affine(d, transform, state->mask.origin);
-    lathe_arena arena = {0};
-    int32_t *slices, *heights = NULL;
-    uint32_t count = 0;
-    status = lathe__level_slices(&slices, &count, &arena, &state->plan, level);
-    place_of_box box = {state->mask.origin, slices, count, structure, lathe_transform_mirrors(transform)};
-    if (!status) status = append(&d->level, mesh, &box);
-    if (!status && !(heights = malloc((count + 1) * sizeof *heights))) status = LATHE_ERR_MEMORY;
-    for (uint32_t i = 0; !status && i < count; i++) heights[i] = slices[i] + state->mask.origin[2];
-    if (!status) {
-        free((void *)(uintptr_t)d->heights[structure].at);
-        d->heights[structure] = (struct lathe_draco_heights){count, heights};
-    }
-    lathe__arena_free(&arena);
+    lathe_draco_shape *shape = &d->shapes[structure], before = *shape;
+    lathe__draco_shape_free(shape);
+    if (!status) status = shape_of(shape, state, mesh, level);
+    memcpy(shape->before, before.stride, sizeof before.stride);
+    if (!status)
+        status = lathe__draco_level_add(&d->level, mesh, structure, shape, state->mask.origin, lathe_transform_mirrors(transform));
     return status;
 }
 
 static lathe_status end_level(delta_writer *d, bool wanted, uint8_t **out, size_t *size) {
     lathe_status status = LATHE_OK;
     if (d->level.triangle_count)
-        status = write_delta(wanted ? out : NULL, size, &d->mesh, &d->level, d->heights, d->mesh.level_count ? NULL : d->affine);
+        status = lathe__draco_delta_write(wanted ? out : NULL, size, &d->mesh, &d->level, d->shapes, d->mesh.level_count ? NULL : d->affine);
     else d->mesh.level_count++;
     d->level.vertex_count = d->level.triangle_count = 0;
     return status;
@@ -300,9 +405,9 @@ static lathe_status run(delta_writer *d, uint32_t level, uint8_t **out, size_t *
 
 static lathe_status open_writer(delta_writer *d, uint32_t level) {
     d->latest = calloc((size_t)d->structure_count + 1, sizeof *d->latest);
-    d->heights = calloc((size_t)d->structure_count + 1, sizeof *d->heights);
+    d->shapes = calloc((size_t)d->structure_count + 1, sizeof *d->shapes);
     lathe_status status = lathe_decoder_open(&d->decoder);
-    if (status || !d->latest || !d->heights) return LATHE_ERR_MEMORY;
+    if (status || !d->latest || !d->shapes) return LATHE_ERR_MEMORY;
     lathe_decoder_build_meshes(d->decoder, false);
     status = lathe_model_stream(d->model, d->alone ? d->structure : -1, 0, level, feed, d);
     return d->fed ? d->fed : status;

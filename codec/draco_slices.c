@@ -1,11 +1,11 @@
 /* Which slice each vertex lies in. The triangles of a slab lie between two shown slices; over an edge within a slice the walk
  * comes to the next slab, over any other it stays. So the third corner of a triangle is in one of three places, and what is
  * known around it nearly tells which. */
-#include "draco_walk.h"
+#include "draco_rings.h"
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_DEGREE = 12, MOST_HALF = 1 << 14 };
+enum { MOST_DEGREE = 12, MOST_HALF = 1 << 14, MOST_HEIGHT = 4 * LATHE_MAX_DIM };
 
 static bool flat(const lathe_draco_walk *w, uint32_t a, uint32_t b) { return w->half[a] == w->half[b] && !(w->half[a] & 1); }
 
@@ -101,32 +101,53 @@ static uint32_t list_runs(int32_t (*runs)[3], const int32_t *fresh, uint32_t cou
     return n;
 }
 
-/* The slices that a structure shows from this level on: those before, unless they are dropped, and runs of new ones. */
+/* How a structure's vertices are told: by steps of some grain, or as rings. */
+static void code_form(lathe_draco_walk *w, uint32_t part, bool told, uint32_t form) {
+    lathe_draco_part *p = &w->mesh->parts[part];
+    form = told ? lathe__walk_number(w, form) : p->grain_log;
+    lathe__draco_rings_free(&p->form);
+    if (form > LATHE_FORM_RINGS) lathe__walk_fail(w, LATHE_ERR_FORMAT);
+    else if (form == LATHE_FORM_RINGS) lathe__walk_ring_form(w, part);
+    else {
+        p->grain_log = form;
+        lathe__draco_rings_free(&p->rings);
+    }
+}
+
+static uint32_t true_form(const lathe_draco_shape *shape) {
+    uint32_t least = (uint32_t)(shape->stride[0] < shape->stride[1] ? shape->stride[0] : shape->stride[1]), log = 0;
+    while (least >> log > 1 && log + 1 < LATHE_FORM_RINGS) log++;
+    return shape->rings.count ? LATHE_FORM_RINGS : log;
+}
+
+/* The slices that a structure shows from this level on: those before, unless they are dropped, and runs of new ones; its form. */
 static void code_heights(lathe_draco_walk *w, uint32_t part) {
     lathe_draco_part *p = &w->mesh->parts[part];
-    const struct lathe_draco_heights *truth = w->truth ? &w->truth->heights[part] : NULL;
+    const lathe_draco_shape *truth = w->truth ? &w->truth->shapes[part] : NULL;
     int32_t(*runs)[3] = NULL;
     uint32_t run_count = 0, fresh_count = 0, keep = 1;
     if (truth) {
-        int32_t *fresh = LATHE_NEW(&w->arena, int32_t, truth->count + 1);
-        runs = (int32_t(*)[3])LATHE_NEW(&w->arena, int32_t, (size_t)3 * truth->count + 3);
+        int32_t *fresh = LATHE_NEW(&w->arena, int32_t, truth->height_count + 1);
+        runs = (int32_t(*)[3])LATHE_NEW(&w->arena, int32_t, (size_t)3 * truth->height_count + 3);
         if (!fresh || !runs) { lathe__walk_fail(w, LATHE_ERR_MEMORY); return; }
-        for (uint32_t i = 0; i < p->height_count; i++) keep = keep && has_height(truth->at, truth->count, p->heights[i]);
-        for (uint32_t i = 0; i < truth->count; i++)
-            if (!keep || !has_height(p->heights, p->height_count, truth->at[i])) fresh[fresh_count++] = truth->at[i];
+        for (uint32_t i = 0; i < p->height_count; i++) keep = keep && has_height(truth->heights, truth->height_count, p->heights[i]);
+        for (uint32_t i = 0; i < truth->height_count; i++)
+            if (!keep || !has_height(p->heights, p->height_count, truth->heights[i])) fresh[fresh_count++] = truth->heights[i];
         run_count = list_runs(runs, fresh, fresh_count);
     }
-    uint32_t head = lathe__walk_number(w, run_count * 2 + keep), kept = head & 1 ? p->height_count : 0, count = kept;
+    uint32_t form = truth ? true_form(truth) : 0, told = form != p->grain_log;
+    uint32_t head = lathe__walk_number(w, run_count * 4 + told * 2 + keep), kept = head & 1 ? p->height_count : 0, count = kept;
+    code_form(w, part, head & 2, form);
     int32_t *heights = malloc(2 * LATHE_MAX_DIM * sizeof *heights), last = 0;
     if (!heights) { lathe__walk_fail(w, LATHE_ERR_MEMORY); return; }
     if (kept) memcpy(heights, p->heights, kept * sizeof *heights);
-    for (uint32_t i = 0; i < head / 2 && !w->failure; i++) {
+    for (uint32_t i = 0; i < head / 4 && !w->failure; i++) {
         int32_t start = lathe__walk_signed(w, runs ? runs[i][0] - last : 0);
         uint32_t step = lathe__walk_number(w, runs ? (uint32_t)runs[i][1] : 0), length = lathe__walk_number(w, runs ? (uint32_t)runs[i][2] : 0);
-        if (start < -2 * LATHE_MAX_DIM || start > 2 * LATHE_MAX_DIM || step > LATHE_MAX_DIM || length > 2 * LATHE_MAX_DIM - count)
+        if (start < -MOST_HEIGHT || start > MOST_HEIGHT || step > MOST_HEIGHT || length > 2 * LATHE_MAX_DIM - count)
             lathe__walk_fail(w, LATHE_ERR_FORMAT);
         for (last += start; length && !w->failure; length--, last += (int32_t)step) {
-            if (last < -LATHE_MAX_DIM || last > 2 * LATHE_MAX_DIM) lathe__walk_fail(w, LATHE_ERR_FORMAT);
+            if (last < -MOST_HEIGHT || last > MOST_HEIGHT) lathe__walk_fail(w, LATHE_ERR_FORMAT);
             else heights[count++] = last;
         }
     }

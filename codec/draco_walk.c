@@ -81,8 +81,60 @@ static bool prepare(lathe_draco_walk *w) {
     if (!w->half || !w->used) return lathe__walk_fail(w, LATHE_ERR_MEMORY);
     for (size_t v = 0; v < n; v++) w->half[v] = LATHE_HALF_UNKNOWN;
     memset(w->used, 0, old);
-    w->old_count = w->mesh->vertex_count;
     return list_corners(w) && pair_edges(w);
+}
+
+/* ---- numbers of vertices ---- */
+
+/* Vertices between slices of the structures that change are gone, others were before: new ones take their numbers. */
+static void list_free(lathe_draco_walk *w) {
+    const lathe_draco_mesh *m = w->mesh;
+    uint8_t *gone = LATHE_NEW(&w->arena, uint8_t, (size_t)m->vertex_count + 1);
+    w->free = LATHE_NEW(&w->arena, uint32_t, (size_t)m->vertex_count + 1);
+    if (!gone || !w->free) { lathe__walk_fail(w, LATHE_ERR_MEMORY); return; }
+    memset(gone, 0, m->vertex_count);
+    for (uint32_t i = 0; i < m->spare_count; i++) gone[m->spare[i]] = 1;
+    for (uint32_t i = 0; i < w->touched_count; i++) {
+        const lathe_draco_part *p = &m->parts[w->touched[i]];
+        for (size_t k = 0; k < (size_t)3 * p->triangle_count; k++) gone[p->triangles[k / 3][k % 3]] = 1;
+        for (uint32_t k = 0; k < p->contour_count; k++) gone[p->contour[k]] = 0;
+    }
+    for (uint32_t v = 0; v < m->vertex_count; v++)
+        if (gone[v]) w->free[w->free_count++] = v;
+}
+
+void lathe__walk_add(lathe_draco_walk *w, uint32_t x, int32_t u, int32_t v, int32_t height) {
+    lathe_draco_mesh *m = w->mesh;
+    bool more = w->free_taken == w->free_count;
+    if (more && m->vertex_count == m->capacity) {
+        uint32_t room = m->capacity + m->capacity / 2 + 1024;
+        void *at = realloc(m->at, (size_t)room * sizeof *m->at), *next = at ? realloc(m->next, (size_t)room * sizeof *m->next) : NULL;
+        if (at) m->at = at;
+        if (next) m->next = next;
+        if (!next || room > INT32_MAX / 2) { lathe__walk_fail(w, LATHE_ERR_MEMORY); return; }
+        m->capacity = room;
+    }
+    uint32_t id = w->id[x] = more ? m->vertex_count++ : w->free[w->free_taken++];
+    m->next[id] = LATHE_DRACO_NONE;
+    m->at[id][0] = u, m->at[id][1] = v, m->at[id][2] = height;
+}
+
+/* Old vertices that the delta has not met, and free numbers that it has not used. */
+static void list_spare(lathe_draco_walk *w) {
+    lathe_draco_mesh *m = w->mesh;
+    uint8_t *taken = LATHE_NEW(&w->arena, uint8_t, (size_t)m->vertex_count + 1);
+    uint32_t *spare = realloc(m->spare, ((size_t)m->vertex_count + 1) * sizeof *spare), count = 0;
+    if (spare) m->spare = spare;
+    if (!taken || !spare) { lathe__walk_fail(w, LATHE_ERR_MEMORY); return; }
+    memset(taken, 0, m->vertex_count);
+    for (uint32_t v = 0; v < w->c->vertex_count; v++) taken[w->id[v]] = 1;
+    for (uint32_t i = w->free_taken; i < w->free_count; i++) taken[spare[count++] = w->free[i]] = 1;
+    for (uint32_t i = 0; i < w->touched_count; i++) {
+        const lathe_draco_part *p = &m->parts[w->touched[i]];
+        for (uint32_t k = 0; k < p->contour_count; k++)
+            if (!taken[p->contour[k]]++) spare[count++] = p->contour[k]; /* once, whatever hostile deltas did */
+    }
+    m->spare_count = count;
 }
 
 /* ---- the mesh that results ---- */
@@ -140,11 +192,11 @@ static bool fill_parts(lathe_draco_walk *w) {
     return true;
 }
 
-/* Of the new vertices' places and of all triangles: that writer and reader have taken the same way. */
+/* Of the vertices' places and of all triangles: that writer and reader have taken the same way. */
 static uint32_t check_sum(const lathe_draco_walk *w) {
     uint32_t hash = 2166136261u;
-    for (uint32_t v = w->old_count; v < w->mesh->vertex_count; v++)
-        for (int k = 0; k < 3; k++) hash = (hash ^ (uint32_t)w->mesh->at[v][k]) * 16777619u;
+    for (uint32_t v = 0; v < w->c->vertex_count; v++)
+        for (int k = 0; k < 3; k++) hash = (hash ^ (uint32_t)w->mesh->at[w->id[v]][k]) * 16777619u;
     for (size_t i = 0; i < (size_t)3 * w->c->triangle_count; i++) hash = (hash ^ w->id[w->c->triangles[i]]) * 16777619u;
     return hash;
 }
@@ -153,8 +205,9 @@ static void finish(lathe_draco_walk *w) {
     uint32_t sum = check_sum(w);
     if (lathe__walk_number(w, sum) != sum) lathe__walk_fail(w, w->failure ? w->failure : LATHE_ERR_CHECKSUM);
     if (w->failure) return;
+    list_spare(w);
     link_outlines(w);
-    if (!empty_parts(w) || !fill_parts(w)) return;
+    if (w->failure || !empty_parts(w) || !fill_parts(w)) return;
     w->mesh->level_count++;
 }
 
@@ -169,16 +222,25 @@ static lathe_status store_numbers(lathe_draco_walk *w) {
     return LATHE_OK;
 }
 
+/* A delta's statistics are a start for the next one's, that is soon outweighed. */
+static void age(lathe_ranks *ranks) {
+    for (uint32_t i = 0; i < ranks->slots; i++)
+        for (uint32_t k = 0; k < ranks->contexts[i].count; k++) ranks->contexts[i].ranks[k].seen /= 64;
+}
+
 lathe_status lathe__draco_walk(lathe_draco_mesh *mesh, lathe_draco_carrier *carrier, const lathe_draco_truth *truth) {
-    lathe_draco_walk w = {.mesh = mesh, .c = carrier, .truth = truth};
+    lathe_draco_walk w = {.mesh = mesh, .c = carrier, .truth = truth, .ranks = mesh->ranks[0]};
     if (!truth) w.numbers = (lathe_bytes){.data = (uint8_t *)carrier->words, .size = (size_t)4 * carrier->word_count};
+    for (int k = 0; k < 2; k++) age(&mesh->ranks[k]);
     if (prepare(&w)) lathe__walk_slices(&w);
-    lathe__ranks_free(&w.ranks);
+    mesh->ranks[0] = w.ranks;
+    w.ranks = mesh->ranks[1];
+    if (!w.failure) list_free(&w);
     if (!w.failure) lathe__walk_places(&w);
     if (!w.failure) finish(&w);
     if (!w.failure && truth) w.failure = store_numbers(&w);
     if (truth) lathe__bytes_free(&w.numbers);
-    lathe__ranks_free(&w.ranks);
+    mesh->ranks[1] = w.ranks;
     lathe__arena_free(&w.arena);
     return w.failure;
 }
