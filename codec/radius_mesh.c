@@ -20,12 +20,36 @@ lathe_point lathe__radius_point(const lathe_radius_map *map, int32_t row, uint32
     return lathe__radius_place(map, map->centre[row], row, ray, map->radius[(size_t)row * map->rays + ray]);
 }
 
-static void place_row(lathe_mesh *mesh, const lathe_radius_map *map, int32_t row, uint32_t stride) {
-    for (uint32_t i = 0; i < map->rays; i += stride) {
-        int32_t *v = mesh->lattice[mesh->vertex_count++];
-        lathe_point p = lathe__radius_point(map, row, i);
-        v[0] = p.x, v[1] = p.y, v[2] = row * LATHE_LATTICE_ONE;
-    }
+/* Directions of a row's rays: a quarter of them is computed, the others are that one turned. */
+typedef struct fan {
+    lathe_point d[LATHE_RADIUS_MAX_RAYS / 4];
+    uint32_t turn;             /* what they have been computed for */
+} fan;
+
+static void aim(fan *f, const lathe_radius_map *map, uint32_t turn, uint32_t stride) {
+    f->turn = turn;
+    for (uint32_t i = 0; i < map->rays / 4; i += stride) f->d[i / stride] = lathe__ray_direction((i * (65536 / map->rays) + turn) & 65535, 65536);
+}
+
+/* As lathe__radius_place has it: radius * 2^10 * direction / 2^14, rounded towards 0. */
+static int32_t along(int32_t radius, int32_t direction) {
+    return (int32_t)((int64_t)radius * direction / (LATHE_RAY_LENGTH / (LATHE_LATTICE_ONE / LATHE_RADIUS_ONE)));
+}
+
+static void place_row(lathe_mesh *mesh, const lathe_radius_map *map, fan *f, int32_t row, uint32_t stride) {
+    uint32_t turn = (uint32_t)map->turn * (uint32_t)row & 65535, quarter = map->rays / 4 / stride;
+    if (f->turn != turn) aim(f, map, turn, stride);
+    const int32_t *radius = map->radius + (size_t)row * map->rays;
+    int32_t x = map->centre[row][0] * (LATHE_LATTICE_ONE / 2), y = map->centre[row][1] * (LATHE_LATTICE_ONE / 2);
+    int32_t(*v)[3] = mesh->lattice + mesh->vertex_count;
+    for (int q = 0; q < 4; q++)
+        for (uint32_t i = 0; i < quarter; i++, v++, radius += stride) {
+            int32_t a = along(*radius, f->d[i].x), b = along(*radius, f->d[i].y);
+            v[0][0] = x + (q == 0 ? a : q == 1 ? -b : q == 2 ? -a : b);
+            v[0][1] = y + (q == 0 ? b : q == 1 ? a : q == 2 ? -b : -a);
+            v[0][2] = row * LATHE_LATTICE_ONE;
+        }
+    mesh->vertex_count += 4 * quarter;
 }
 
 static void add(lathe_mesh *mesh, uint32_t a, uint32_t b, uint32_t c) {
@@ -34,16 +58,15 @@ static void add(lathe_mesh *mesh, uint32_t a, uint32_t b, uint32_t c) {
 }
 
 static void add_strip(lathe_mesh *mesh, uint32_t lower, uint32_t upper, uint32_t rays) {
-    for (uint32_t i = 0; i < rays; i++) {
+    const int32_t(*at)[3] = (const int32_t(*)[3])mesh->lattice;
+    uint32_t(*t)[3] = mesh->triangles + mesh->triangle_count;
+    for (uint32_t i = 0; i < rays; i++, t += 2) {
         uint32_t k = i + 1 < rays ? i + 1 : 0, a = lower + i, b = lower + k, c = upper + k, d = upper + i;
-        if (squared(mesh->lattice[a], mesh->lattice[c]) <= squared(mesh->lattice[b], mesh->lattice[d])) {
-            add(mesh, a, b, c);
-            add(mesh, a, c, d);
-        } else {
-            add(mesh, a, b, d);
-            add(mesh, b, c, d);
-        }
+        bool from_a = squared(at[a], at[c]) <= squared(at[b], at[d]);
+        t[0][0] = a, t[0][1] = b, t[0][2] = from_a ? c : d;
+        t[1][0] = from_a ? a : b, t[1][1] = c, t[1][2] = d;
     }
+    mesh->triangle_count += 2 * rays;
 }
 
 /* side 0: below the first row, 1: above the last. */
@@ -66,8 +89,9 @@ lathe_status lathe__radius_strips(lathe_mesh *out, const lathe_radius_map *map, 
         lathe_mesh_free(&mesh);
         return LATHE_ERR_MEMORY;
     }
+    fan f = {.turn = UINT32_MAX};
     for (uint32_t i = 0; i < rows; i++) {
-        place_row(&mesh, map, list[i], stride);
+        place_row(&mesh, map, &f, list[i], stride);
         if (i) add_strip(&mesh, mesh.vertex_count - 2 * rays, mesh.vertex_count - rays, rays);
     }
     uint32_t top = mesh.vertex_count - rays;

@@ -18,8 +18,10 @@ enum { NONE = 0xffffffffu };
 enum { ROOM = 64, SPACING = 8 }; /* lattice units: what rounding cannot bridge */
 #ifdef LATHE_SMALL
 enum { COUNTED = 0 };          /* nobody asks a small decoder how its joints turned out */
+enum { CHAINED = 0 };          /* nor are lattice outlines worth a search of their own to it: 0.4 kB */
 #else
 enum { COUNTED = 1 };
+enum { CHAINED = 1 };
 #endif
 
 typedef struct cycle {
@@ -46,7 +48,9 @@ typedef struct overlay {
     uint32_t *on;              /* meetings edge by edge, in order */
     uint32_t *cycle;           /* sub-edge (edge + first[edge] + rank) -> the cycle it bounds, or NONE */
     uint8_t *inside;           /* sub-edge: within the other region? */
-    lathe_grid rows;           /* edges by pixel row, horizontal ones left out */
+    lathe_grid rows;           /* edges by pixel row, horizontal ones left out; once asked for. Of lattice outlines, */
+    uint32_t *row, *row_chain; /* whose edges lie in one row each: row -> its first edge, edge -> the next one, or NONE */
+    int32_t row0;              /* of row[0] */
     lathe_meeting *meetings;
     uint32_t meeting_count, meeting_capacity;
     uint32_t *nodes;           /* of all cycles */
@@ -165,7 +169,51 @@ static lathe_range *list_ranges(const overlay *o, bool rows) {
     return ranges;
 }
 
+/* The pixel square that a lattice outline's edge lies in; without its far rims. */
+static lathe_range square_range(const overlay *o, uint32_t e) {
+    lathe_point p = o->at[e], q = o->at[o->next[e]];
+    lathe_range r = {imin(p.x, q.x), imin(p.y, q.y), imax(p.x, q.x), imax(p.y, q.y)};
+    r.x1 = imax(r.x1 - 1, r.x0);
+    r.y1 = imax(r.y1 - 1, r.y0);
+    return r;
+}
+
+/* The same for lattice outlines: an edge has one cell only, so the lower outline's edges are chained square by square. */
+static lathe_status find_lattice_meetings(overlay *o) {
+    if (!o->upper || o->upper == o->vertices) return LATHE_OK;
+    lathe_range all = {o->at[0].x, o->at[0].y, o->at[0].x, o->at[0].y};
+    for (uint32_t e = 1; e < o->upper; e++) {
+        lathe_point p = o->at[e];
+        all = (lathe_range){imin(all.x0, p.x), imin(all.y0, p.y), imax(all.x1, p.x), imax(all.y1, p.y)};
+    }
+    all = lathe__cells_of(&all, LATHE_LATTICE_BITS);
+    size_t width = (size_t)(all.x1 - all.x0) + 1, cells = width * ((size_t)(all.y1 - all.y0) + 1);
+    uint32_t *head = LATHE_NEW(o->arena, uint32_t, cells), *chain = LATHE_NEW(o->arena, uint32_t, o->upper);
+    if (!head || !chain) return LATHE_ERR_MEMORY;
+    memset(head, 0xff, cells * sizeof *head);
+    for (uint32_t e = o->upper; e--;) {   /* so that chains ascend */
+        lathe_point p = o->at[e], q = o->at[o->next[e]];
+        int32_t x = (imin(p.x, q.x) >> LATHE_LATTICE_BITS) - all.x0, y = (imin(p.y, q.y) >> LATHE_LATTICE_BITS) - all.y0;
+        uint32_t *first = &head[(size_t)y * width + (size_t)x];
+        chain[e] = *first;
+        *first = e;
+    }
+    for (uint32_t f = o->upper; f < o->vertices; f++) {
+        lathe_range b = square_range(o, f);
+        int32_t x = b.x0 >> LATHE_LATTICE_BITS, y = b.y0 >> LATHE_LATTICE_BITS;
+        if (x < all.x0 || x > all.x1 || y < all.y0 || y > all.y1) continue;
+        for (uint32_t e = head[(size_t)(y - all.y0) * width + (size_t)(x - all.x0)]; e != NONE; e = chain[e]) {
+            lathe_range a = square_range(o, e);
+            if (!lathe__ranges_meet(&a, &b)) continue;
+            lathe_status status = test_edges(o, e, f);
+            if (status) return status;
+        }
+    }
+    return LATHE_OK;
+}
+
 static lathe_status find_meetings(overlay *o) {
+    if (CHAINED && o->slab->lattice && !o->slab->crowded) return find_lattice_meetings(o);
     uint32_t below = o->slab->crowded ? o->vertices : o->upper;   /* what the upper outline is held against */
     if (!below || o->upper == o->vertices) return LATHE_OK;
     lathe_grid grid;
@@ -278,9 +326,11 @@ static uint32_t nearest_left(const overlay *o, uint32_t vertex, int sides) {
     lathe_point at = o->at[vertex];
     uint32_t best = NONE;
     lathe_left nearest = LATHE_NOTHING_LEFT;
-    size_t row = (size_t)((at.y >> LATHE_LATTICE_BITS) - o->rows.cells.y0);
-    for (uint32_t i = o->rows.first[row]; i < o->rows.first[row + 1]; i++) {
-        uint32_t e = o->rows.entry[i];
+    int32_t y = at.y >> LATHE_LATTICE_BITS;
+    bool chained = CHAINED && o->row;
+    const uint32_t *first = chained ? NULL : o->rows.first + (y - o->rows.cells.y0);
+    for (uint32_t i = chained ? o->row[y - o->row0] : first[0]; chained ? i != NONE : i < first[1]; i = chained ? o->row_chain[i] : i + 1) {
+        uint32_t e = chained ? i : o->rows.entry[i];
         if (e == vertex || e == o->prev[vertex] || !(sides >> side_of(o, e) & 1)) continue;
         if (lathe__is_nearer_left(&nearest, at, o->at[e], o->at[o->next[e]])) best = e;
     }
@@ -289,17 +339,42 @@ static uint32_t nearest_left(const overlay *o, uint32_t vertex, int sides) {
 
 static bool goes_down(const overlay *o, uint32_t e) { return o->at[o->next[e]].y < o->at[e].y; }
 
-static lathe_status mark_inside(overlay *o) {
+static lathe_status chain_rows(overlay *o) {
+    int32_t low = o->at[0].y, high = low;
+    for (uint32_t e = 1; e < o->vertices; e++) low = imin(low, o->at[e].y), high = imax(high, o->at[e].y);
+    low >>= LATHE_LATTICE_BITS, high >>= LATHE_LATTICE_BITS;
+    size_t rows = (size_t)(high - low) + 1;
+    o->row_chain = LATHE_NEW(o->arena, uint32_t, o->vertices);
+    o->row = LATHE_NEW(o->arena, uint32_t, rows);
+    o->row0 = low;
+    if (!o->row || !o->row_chain) return LATHE_ERR_MEMORY;
+    memset(o->row, 0xff, rows * sizeof *o->row);
+    for (uint32_t e = o->vertices; e--;) {   /* so that chains ascend */
+        int32_t y0 = o->at[e].y, y1 = o->at[o->next[e]].y;
+        if (y0 == y1) continue;
+        uint32_t *first = &o->row[(imin(y0, y1) >> LATHE_LATTICE_BITS) - low];
+        o->row_chain[e] = *first;
+        *first = e;
+    }
+    return LATHE_OK;
+}
+
+static lathe_status need_rows(overlay *o) {
+    if (o->row || o->rows.first) return LATHE_OK;
+    if (CHAINED && o->slab->lattice) return chain_rows(o);
     const lathe_range *ranges = list_ranges(o, true);
-    if (!ranges) return LATHE_ERR_MEMORY;
-    lathe_status status = lathe__grid_build(&o->rows, o->arena, ranges, o->vertices, UINT64_MAX);
-    if (status) return status;
+    return ranges ? lathe__grid_build(&o->rows, o->arena, ranges, o->vertices, UINT64_MAX) : LATHE_ERR_MEMORY;
+}
+
+static lathe_status mark_inside(overlay *o) {
     for (uint32_t l = 0; l < o->loops; l++) {
         uint32_t begin = o->loop_first[l], end = o->loop_first[l + 1];
         bool now;
         if (o->first[begin] != o->first[end]) {
             now = o->meetings[o->on[o->first[begin]]].enters == (l >= o->loops0);
         } else {
+            lathe_status status = need_rows(o);
+            if (status) return status;
             uint32_t e = nearest_left(o, begin, l < o->loops0 ? 2 : 1);
             now = e != NONE && goes_down(o, e);
         }
@@ -416,11 +491,13 @@ static uint32_t left_of_hole(const overlay *o, const cycle *c) {
     return o->cycle[sub];
 }
 
-static void group_cells(overlay *o) {
+static lathe_status group_cells(overlay *o) {
     for (uint32_t i = 0; i < o->cycle_count; i++) {
         cycle *c = &o->cycles[i];
         c->hole = turns_right(o, c);
         if (!c->hole) continue;
+        lathe_status status = need_rows(o);
+        if (status) return status;
         uint32_t other = left_of_hole(o, c);
         if (other != NONE && o->cycles[other].of == c->of && cell_of(o, other) != i) c->parent = other;
     }
@@ -431,6 +508,7 @@ static void group_cells(overlay *o) {
         o->cycles[i].next_hole = o->cycles[cell].next_hole;
         o->cycles[cell].next_hole = i;
     }
+    return LATHE_OK;
 }
 
 /* Links [Park & Kim 3.1, by overlap of the regions]: loops that bound a common cell, or meet, belong to one block. */
@@ -778,8 +856,7 @@ lathe_status lathe__overlay_slab(lathe_mesh_builder *builder, lathe_arena *arena
     for (size_t i = 0; i < sizeof step / sizeof *step; i++)
         if ((status = step[i](&o)) != LATHE_OK) return status;
     counts->crossings += o.meeting_count * COUNTED;
-    group_cells(&o);
-    if ((status = link_loops(&o)) != LATHE_OK) return status;
+    if ((status = group_cells(&o)) != LATHE_OK || (status = link_loops(&o)) != LATHE_OK) return status;
     for (uint32_t i = 0; i < o.cycle_count; i++)
         if (o.cycles[i].parent == i && (status = tile_cell(&o, i)) != LATHE_OK) return status;
     return close_uprights(&o);

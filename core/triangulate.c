@@ -1,10 +1,12 @@
 /* Polygons with holes: holes are bridged, ears clipped, diagonals flipped towards Delaunay. A grid finds what may lie in the way,
  * and cutting an ear changes its two neighbours only, so the time grows about as the number of vertices does. Exact for simple
  * polygons; it ends also where rounding has folded one. */
+#include <string.h>
 #include "grid.h"
 #include "overlay.h"
 
 enum { NONE = 0xffffffffu, BRIDGE = 0x80000000u, PLACES_PER_CELL = 4, FLIP_TURNS = 48 };
+enum { FEW = 16 };             /* so many places need no grid: most polygons of a slab have fewer */
 
 typedef struct ring {
     uint32_t *node, *next, *prev;  /* places of one doubly linked ring */
@@ -16,7 +18,8 @@ typedef struct ring {
     lathe_point *at;               /* place -> position */
     uint32_t places;
     const lathe_point *positions;  /* node -> position */
-    lathe_grid grid;               /* of the rings' edges, each numbered as its first place */
+    lathe_grid grid;               /* of the rings' edges, each numbered as its first place; not if there are few */
+    bool few;
     uint32_t rim;                  /* places of the rings; behind them two for each bridge */
 } ring;
 
@@ -127,21 +130,36 @@ static void bridge_hole(ring *r, uint32_t leftmost) {
     r->across[left2] = BRIDGE + place;
 }
 
+static int32_t least(int32_t a, int32_t b) { return a < b ? a : b; }
+static int32_t most(int32_t a, int32_t b) { return a > b ? a : b; }
+
+static bool is_within(const lathe_range *box, lathe_point q) {
+    return !((q.x < box->x0) | (q.x > box->x1) | (q.y < box->y0) | (q.y > box->y1));
+}
+
+/* Does place i, in the box of the triangle of another one and its neighbours, lie within the triangle? */
+static bool hides(const ring *r, uint32_t p, uint32_t place, uint32_t n, uint32_t i) {
+    if (same(r, i, p) || same(r, i, place) || same(r, i, n)) return false;
+    return lathe__turn(r->at, p, place, i) >= 0 && lathe__turn(r->at, place, n, i) >= 0 && lathe__turn(r->at, n, p, i) >= 0;
+}
+
 static bool is_ear(const ring *r, uint32_t place) {
     uint32_t p = r->prev[place], n = r->next[place];
     if (lathe__turn(r->at, p, place, n) <= 0) return false;
-    lathe_range box = lathe__range_of(r->at[p], r->at[place]);
-    lathe__range_add(&box, r->at[n].x, r->at[n].y);
+    lathe_point a = r->at[p], b = r->at[place], d = r->at[n];
+    lathe_range box = {least(least(a.x, b.x), d.x), least(least(a.y, b.y), d.y), most(most(a.x, b.x), d.x), most(most(a.y, b.y), d.y)};
+    if (r->few) {
+        for (uint32_t i = 0; i < r->rim; i++)
+            if (is_within(&box, r->at[i]) && hides(r, p, place, n, i)) return false;
+        return true;
+    }
     lathe_range c = lathe__cells_of(&box, r->grid.shift);
     for (int32_t y = c.y0; y <= c.y1; y++)
         for (int32_t x = c.x0; x <= c.x1; x++) {
             size_t cell = lathe__cell_at(&r->grid, x, y);
             for (uint32_t k = r->grid.first[cell]; k < r->grid.first[cell + 1]; k++) {
                 uint32_t i = r->grid.entry[k];
-                lathe_point q = r->at[i];
-                if (q.x < box.x0 || q.x > box.x1 || q.y < box.y0 || q.y > box.y1 || same(r, i, p) || same(r, i, place) || same(r, i, n)) continue;
-                if (lathe__turn(r->at, p, place, i) < 0 || lathe__turn(r->at, place, n, i) < 0 || lathe__turn(r->at, n, p, i) < 0) continue;
-                return false;
+                if (is_within(&box, r->at[i]) && hides(r, p, place, n, i)) return false;
             }
         }
     return true;
@@ -233,11 +251,14 @@ static bool in_circle(lathe_point a, lathe_point b, lathe_point c, lathe_point d
     return det > size * 1e-9;
 }
 
-static void flip(uint32_t *corner, uint32_t *neighbour, const lathe_point *at, uint32_t count) {
-    bool changed = true;
+/* settled: of corners, zeroed: their edge was left as it is, and neither of its triangles has changed since. */
+static void flip(uint32_t *corner, uint32_t *neighbour, uint8_t *settled, const lathe_point *at, uint32_t count) {
+    bool changed = count > 1;
     for (int turns = 0; changed && turns < FLIP_TURNS; turns++) {
         changed = false;
         for (uint32_t i = 0; i < count * 3; i++) {
+            if (settled[i]) continue;
+            settled[i] = 1;
             uint32_t j = neighbour[i], p = i - i % 3, q = j - j % 3;
             if (j == UINT32_MAX || p == q) continue;
             uint32_t i1 = turned(i), i2 = turned(i1), j1 = turned(j), j2 = turned(j1);
@@ -254,6 +275,10 @@ static void flip(uint32_t *corner, uint32_t *neighbour, const lathe_point *at, u
             join(neighbour, p + 2, q + 2);
             join(neighbour, q, db);
             join(neighbour, q + 1, bc);
+            const uint32_t beside[4] = {ca, ad, db, bc};
+            for (int k = 0; k < 3; k++) settled[p + k] = settled[q + k] = 0;
+            for (int k = 0; k < 4; k++)
+                if (beside[k] != NONE) settled[beside[k]] = 0;
             changed = true;
         }
     }
@@ -289,13 +314,16 @@ lathe_status lathe__triangulate(uint32_t (**triangles)[3], uint32_t **neighbour,
     uint32_t *queue = room + 6 * (size_t)places, *hole = room + 9 * (size_t)places;
     for (uint32_t i = 0, begin = 0; i <= holes; begin = polygon->ring_end[i++])
         hole[i] = add_ring(&r, polygon->nodes + begin, polygon->ring_end[i] - begin);
-    lathe_status status = build_grid(&r, arena);
-    if (status) return status;
     r.rim = nodes;
+    r.few = !holes && nodes <= FEW;
+    lathe_status status = r.few ? LATHE_OK : build_grid(&r, arena);
+    if (status) return status;
     sort_holes(&r, hole + 1, holes);
     for (uint32_t i = 1; i <= holes; i++) bridge_hole(&r, hole[i]);
     *count = clip_ears(&r, queue, *triangles);
     if (!*count) return LATHE_ERR_FORMAT;
-    flip(**triangles, *neighbour, polygon->at, *count);
+    /* The queue has served: it has more bytes than there are corners. */
+    memset(queue, 0, (size_t)*count * 3);
+    flip(**triangles, *neighbour, (uint8_t *)queue, polygon->at, *count);
     return LATHE_OK;
 }

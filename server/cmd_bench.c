@@ -49,46 +49,81 @@ static lathe_status step_through(lathe_decoder *decoder, bool all_levels, decode
 
 /* ---- with what a renderer needs besides ---- */
 
-static void add_normals(float *normals, const float *positions, const uint32_t *indices, uint32_t triangle_count) {
-    for (uint32_t i = 0; i < triangle_count; i++, indices += 3) {
-        const float *a = positions + 3 * (size_t)indices[0], *b = positions + 3 * (size_t)indices[1],
-                    *c = positions + 3 * (size_t)indices[2];
-        float p[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, q[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-        float n[3] = {p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]};
-        for (int corner = 0; corner < 3; corner++)
-            for (int k = 0; k < 3; k++) normals[3 * (size_t)indices[corner] + (size_t)k] += n[k];
+/* Where a renderer wants it; kept from mesh to mesh, and from run to run. */
+typedef struct dress {
+    float *positions, *normals;    /* 3 a vertex: mm; of length 1 */
+    uint32_t *indices;
+    struct vertex_sum *sums;
+    size_t vertices, triangles;    /* room for so many */
+} dress;
+
+typedef float four __attribute__((vector_size(16)));
+typedef struct vertex_sum { four at, normal; } vertex_sum;   /* the fourth is 0 */
+
+static void free_dress(dress *d) {
+    free(d->positions);
+    free(d->normals);
+    free(d->indices);
+    free(d->sums);
+    *d = (dress){0};
+}
+
+static lathe_status make_room(dress *d, const lathe_mesh *mesh) {
+    if (mesh->vertex_count <= d->vertices && mesh->triangle_count <= d->triangles && d->sums) return LATHE_OK;
+    size_t vertices = d->vertices > mesh->vertex_count ? d->vertices : (size_t)mesh->vertex_count + 1;
+    size_t triangles = d->triangles > mesh->triangle_count ? d->triangles : (size_t)mesh->triangle_count + 1;
+    free_dress(d);
+    d->positions = malloc(vertices * 12);
+    d->normals = malloc(vertices * 12);
+    d->indices = malloc(triangles * 12);
+    d->sums = aligned_alloc(32, vertices * sizeof *d->sums);
+    if (!d->positions || !d->normals || !d->indices || !d->sums) return LATHE_ERR_MEMORY;
+    d->vertices = vertices;
+    d->triangles = triangles;
+    return LATHE_OK;
+}
+
+/* Indices, and of each vertex the sum of its triangles' normals, by area. */
+static void add_normals(vertex_sum *sums, uint32_t *indices, const lathe_mesh *mesh, bool mirrored) {
+    int second = 1 + mirrored, third = 2 - mirrored;
+    for (uint32_t i = 0; i < mesh->triangle_count; i++, indices += 3) {
+        const uint32_t *t = mesh->triangles[i];
+        indices[0] = t[0], indices[1] = t[second], indices[2] = t[third];
+        vertex_sum *a = &sums[indices[0]], *b = &sums[indices[1]], *c = &sums[indices[2]];
+        four p = b->at - a->at, q = c->at - a->at;
+        four n = {p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0], 0};
+        a->normal += n;
+        b->normal += n;
+        c->normal += n;
     }
 }
 
-static void make_unit(float *normals, uint32_t vertex_count) {
+static void make_unit(float *normals, const vertex_sum *sums, uint32_t vertex_count) {
     for (uint32_t i = 0; i < vertex_count; i++, normals += 3) {
-        float length = sqrtf(normals[0] * normals[0] + normals[1] * normals[1] + normals[2] * normals[2]);
-        float scale = length > 0 ? 1 / length : 0;
-        for (int k = 0; k < 3; k++) normals[k] *= scale;
+        four n = sums[i].normal, square = n * n;
+        float length = sqrtf(square[0] + square[1] + square[2]), scale = length > 0 ? 1 / length : 0;
+        for (int k = 0; k < 3; k++) normals[k] = n[k] * scale;
     }
 }
 
-static lathe_status dress_mesh(const lathe_mesh *mesh, const lathe_transform *transform) {
-    float *positions = malloc((size_t)mesh->vertex_count * 12 + 1),
-          *normals = calloc((size_t)mesh->vertex_count + 1, 12);
-    uint32_t *indices = malloc((size_t)mesh->triangle_count * 12 + 1);
-    lathe_status status = positions && normals && indices ? LATHE_OK : LATHE_ERR_MEMORY;
-    if (!status) {
-        lathe_mesh_positions(mesh, transform, positions);
-        lathe_mesh_indices(mesh, transform, indices);
-        add_normals(normals, positions, indices, mesh->triangle_count);
-        make_unit(normals, mesh->vertex_count);
+static lathe_status dress_mesh(dress *d, const lathe_mesh *mesh, const lathe_transform *transform) {
+    lathe_status status = make_room(d, mesh);
+    if (status) return status;
+    lathe_mesh_positions(mesh, transform, d->positions);
+    for (uint32_t i = 0; i < mesh->vertex_count; i++) {
+        const float *p = d->positions + 3 * (size_t)i;
+        d->sums[i] = (vertex_sum){.at = {p[0], p[1], p[2], 0}};
     }
-    free(positions);
-    free(normals);
-    free(indices);
-    return status;
+    add_normals(d->sums, d->indices, mesh, lathe_transform_mirrors(transform));
+    make_unit(d->normals, d->sums, mesh->vertex_count);
+    return LATHE_OK;
 }
 
 /* What to do with the last meshes, once they are built. */
-typedef enum hashing { HASH_NONE, HASH_ALL, HASH_EACH, DRESS } hashing;   /* DRESS: positions in mm, indices, normals */
+typedef enum hashing { HASH_NONE, HASH_ALL, HASH_EACH } hashing;
 
-static lathe_status last_meshes(lathe_decoder *decoder, hashing hash, decode_result *result) {
+/* clothes: of positions in mm, indices and normals, or NULL: only the meshes */
+static lathe_status last_meshes(lathe_decoder *decoder, hashing hash, dress *clothes, decode_result *result) {
     uint32_t count = lathe_decoder_structures(decoder);
     result->hash = LATHE_FNV_START;
     for (uint32_t i = 0; i < count; i++) {
@@ -97,14 +132,14 @@ static lathe_status last_meshes(lathe_decoder *decoder, hashing hash, decode_res
         result->last_triangles += mesh->triangle_count;
         result->vertices += mesh->vertex_count;
         if (hash == HASH_ALL) result->hash = lathe__hash_mesh(result->hash, mesh);
-        if (hash == DRESS && dress_mesh(mesh, lathe_decoder_transform(decoder, i))) return LATHE_ERR_MEMORY;
+        if (clothes && dress_mesh(clothes, mesh, lathe_decoder_transform(decoder, i))) return LATHE_ERR_MEMORY;
         if (hash == HASH_EACH) printf("%016llx\n", (unsigned long long)lathe__hash_mesh(LATHE_FNV_START, mesh));
     }
     return LATHE_OK;
 }
 
 static lathe_status decode_once(decode_result *out, const uint8_t *stream, size_t size, bool all_levels, hashing hash,
-                                lathe_error *err) {
+                                dress *clothes, lathe_error *err) {
     decode_result result;
     memset(&result, 0, sizeof result);
     double start = lathe__cpu_seconds();
@@ -114,7 +149,7 @@ static lathe_status decode_once(decode_result *out, const uint8_t *stream, size_
     lathe_decoder_build_meshes(decoder, all_levels);
     status = lathe_decoder_feed(decoder, stream, size);
     if (!status) status = step_through(decoder, all_levels, &result);
-    if (!status) status = last_meshes(decoder, hash, &result);
+    if (!status) status = last_meshes(decoder, hash, clothes, &result);
     if (status) lathe_fail(err, status, "%s", lathe_decoder_error(decoder));
     result.seconds = lathe__cpu_seconds() - start;
     lathe_decoder_close(&decoder);
@@ -127,7 +162,7 @@ static lathe_status decode_best(decode_result *out, const uint8_t *stream, size_
                                 lathe_error *err) {
     for (int i = 0; i < repeats; i++) {
         decode_result result;
-        lathe_status status = decode_once(&result, stream, size, all_levels, HASH_NONE, err);
+        lathe_status status = decode_once(&result, stream, size, all_levels, HASH_NONE, NULL, err);
         if (status) return status;
         if (i == 0 || result.seconds < out->seconds) *out = result;
     }
@@ -139,7 +174,7 @@ static lathe_status measure(decode_result *last, decode_result *all, const lathe
     size_t size;
     const uint8_t *stream = lathe__whole_stream(model, &size);
     decode_result hashed;
-    lathe_status status = decode_once(&hashed, stream, size, false, HASH_ALL, err);
+    lathe_status status = decode_once(&hashed, stream, size, false, HASH_ALL, NULL, err);
     if (!status) status = decode_best(last, stream, size, false, repeats, err);
     if (!status) status = decode_best(all, stream, size, true, repeats, err);
     if (!status) last->hash = hashed.hash;
@@ -150,16 +185,19 @@ lathe_status lathe__measure_decoding(lathe__decode_speed *out, const lathe_model
                                      lathe_error *err) {
     size_t size;
     const uint8_t *stream = lathe__whole_stream(model, &size);
-    for (int i = 0; i < repeats; i++) {
+    dress clothes = {0};
+    lathe_status status = LATHE_OK;
+    for (int i = 0; !status && i < repeats; i++) {
         decode_result plain, dressed;
-        lathe_status status = decode_once(&plain, stream, size, false, HASH_NONE, err);
-        if (!status) status = decode_once(&dressed, stream, size, false, DRESS, err);
-        if (status) return status;
+        status = decode_once(&plain, stream, size, false, HASH_NONE, NULL, err);
+        if (!status) status = decode_once(&dressed, stream, size, false, HASH_NONE, &clothes, err);
+        if (status) break;
         out->triangles = plain.last_triangles;
         if (i == 0 || plain.seconds < out->seconds) out->seconds = plain.seconds;
         if (i == 0 || dressed.seconds < out->with_normals) out->with_normals = dressed.seconds;
     }
-    return LATHE_OK;
+    free_dress(&clothes);
+    return status;
 }
 
 static double per_second(uint64_t triangles, double seconds) { return seconds > 0 ? (double)triangles / seconds : 0; }
@@ -218,7 +256,7 @@ static int run_hash(int argc, char **argv) {
     if (!result) {
         size_t size;
         const uint8_t *stream = lathe__whole_stream(model, &size);
-        result = decode_once(&decoded, stream, size, false, each ? HASH_EACH : HASH_ALL, &err);
+        result = decode_once(&decoded, stream, size, false, each ? HASH_EACH : HASH_ALL, NULL, &err);
     }
     lathe_model_close(&model);
     if (result) return lathe__status_error("hash", argv[1], result, &err);
