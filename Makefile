@@ -127,8 +127,9 @@ WASM_BUILTINS = $(firstword $(shell find -L $$($(CLANG) -print-resource-dir)/lib
 wasm: $(WASM) ## the decoder as wasm: build/wasm/lathe.wasm
 web: $(VIEWER) $(DRACO_PAGE) ## the viewer page: web/dist/viewer.html; the page of the Draco deltas
 
-# Where the time goes: 0.5 kB more, a seventh faster.
-$(patsubst %.c,build/wasm/%.o,$(filter codec/occupancy_% codec/range_%,$(WASM_SOURCES))): WASM_OPTIMISE := -O2 -fno-unroll-loops
+HOT := $(addsuffix %,$(addprefix codec/,occupancy_ range_ pyramid) $(addprefix core/,triangulate grid overlay outline centre crossing))
+# Where the time goes: 1.6 kB more, a fifth faster.
+$(patsubst %.c,build/wasm/%.o,$(filter $(HOT),$(WASM_SOURCES))): WASM_OPTIMISE := -O2 -fno-unroll-loops
 
 build/wasm/%.o: %.c
 	@mkdir -p $(@D)

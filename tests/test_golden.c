@@ -119,15 +119,20 @@ static void add_stars(digest *d, const lathe_structure_state *s, const int32_t *
     }
 }
 
+/* Where the shapes of the caps begin. */
+static void add_caps(digest *d, const lathe_structure_state *s) {
+    if (!s->cap_bytes) return;
+    add(d, s->cap_code.code), add(d, s->cap_code.range);
+    add(d, (uint32_t)(s->cap_code.end - s->cap_code.at)), add(d, s->cap_code.overrun);
+}
+
 static void add_slices(digest *d, const lathe_structure_state *s, const int32_t *slices, uint32_t count) {
     for (uint32_t i = 0; i < count; i++) {
         const uint64_t *words = lathe__mask_slice(&s->mask, slices[i]);
         add(d, (uint32_t)slices[i]), add(d, s->finer ? s->finer[i] : 0);
         for (size_t k = 0; k < lathe__mask_slice_words(&s->mask); k++) add64(d, words[k]);
     }
-    if (!s->cap_bytes) return;   /* else: where the shapes of the caps begin */
-    add(d, s->cap_code.code), add(d, s->cap_code.range);
-    add(d, (uint32_t)(s->cap_code.end - s->cap_code.at)), add(d, s->cap_code.overrun);
+    add_caps(d, s);
 }
 
 /* Of each tube where it lies, and all that is shown of it. */
@@ -161,16 +166,26 @@ static void add_radii(digest *d, const lathe_structure_state *s) {
     }
 }
 
+static void add_raster(digest *d, const lathe_structure_state *s) {
+    const lathe_mask *raster = s->lattice.bits ? &s->lattice : &s->mask;
+    size_t words = lathe__mask_slice_words(raster) * (size_t)raster->size[2];
+    for (int k = 0; k < 3; k++) add(d, (uint32_t)s->stride[k]);
+    for (int k = 0; k < 3; k++) add(d, (uint32_t)raster->size[k]);
+    for (size_t i = 0; i < words; i++) add64(d, raster->bits[i]);
+    add_caps(d, s);
+}
+
 /* What the packet of a step said. */
 static uint64_t packet_digest(const char **kind, const lathe_structure_state *s, const lathe_step *step) {
     digest d = START;
     lathe_arena arena = {0};
     int32_t *slices;
     uint32_t count;
-    if (lathe__level_slices(&slices, &count, &arena, &s->plan, (uint32_t)s->level)) abort();
+    if (lathe__state_slices(&slices, &count, &arena, s)) abort();
     add_float(&d, step->error_rms_mm), add_float(&d, step->error_max_mm);
-    *kind = s->radii ? "radii" : s->base ? "stars" : "slices";
-    if (s->radii) add_radii(&d, s);
+    *kind = s->pyramid ? "raster" : s->radii ? "radii" : s->base ? "stars" : "slices";
+    if (s->pyramid) add_raster(&d, s);
+    else if (s->radii) add_radii(&d, s);
     else if (s->base) add_stars(&d, s, slices, count);
     else add_slices(&d, s, slices, count);
     lathe__arena_free(&arena);
@@ -187,7 +202,7 @@ static uint64_t mesh_digest(const lathe_mesh *mesh) {
 /* ---- where the records of an archive are ---- */
 
 enum { MOST_PACKETS = 256 };
-typedef struct packet { size_t begin, end; uint32_t level, structure; } packet;
+typedef struct packet { size_t begin, end; uint32_t level, structure, steps; } packet;   /* steps: more than 1 if it is of all structures */
 typedef struct records {
     size_t header, stream;     /* bytes of both */
     packet packets[MOST_PACKETS];
@@ -204,11 +219,13 @@ static lathe_header find_records(records *out, const file *f) {
     for (uint32_t level = 0; level < header.level_count; level++) {
         lathe_level_head head;
         if (lathe__level_parse(&head, &reader, &header)) abort();
-        for (uint32_t i = 0, packet_of = 0; i < header.structure_count; i++) {
-            if (header.structures[i].level_count <= level) continue;
+        bool all = lathe__header_flags(&header) & LATHE_FLAG_PYRAMID && lathe__header_flags(&header) & LATHE_FLAG_SHARED;
+        for (uint32_t k = 0, structure = 0; k < head.count; k++) {
             size_t begin = (size_t)(reader.at - f->bytes);
-            if (out->count == MOST_PACKETS || !lathe__packet_parse(&reader, head.sizes[packet_of++])) abort();
-            out->packets[out->count++] = (packet){begin, (size_t)(reader.at - f->bytes), level, i};
+            while (header.structures[structure].level_count <= level) structure++;
+            if (out->count == MOST_PACKETS || !lathe__packet_parse(&reader, head.sizes[k])) abort();
+            out->packets[out->count++] = (packet){begin, (size_t)(reader.at - f->bytes), level, structure, all ? header.structure_count : 1};
+            if (!all && ++structure == header.structure_count) structure = 0;
         }
         lathe__level_head_free(&head);
     }
@@ -225,21 +242,24 @@ static void decode(FILE *packets, FILE *meshes, const char *name, const file *f)
     lathe_decoder *decoder;
     lathe_step step;
     if (lathe_decoder_open(&decoder) || lathe_decoder_feed(decoder, f->bytes, r.stream)) abort();
+    lathe_decoder_every_pass(decoder, true);
     lathe_status status;
-    uint32_t steps = 0;
+    uint32_t at = 0, steps = 0;
     while (!(status = lathe_decoder_step(decoder, &step))) {
         const char *kind;
+        char level[16];
+        snprintf(level, sizeof level, step.passes_left ? "%u-%u" : "%u", step.level, step.passes_left);
         uint64_t digest = packet_digest(&kind, lathe__decoder_state(decoder, step.structure), &step);
-        fprintf(packets, "%s %u %u %s %016llx\n", name, step.level, step.structure, kind, (unsigned long long)digest);
+        fprintf(packets, "%s %s %u %s %016llx\n", name, level, step.structure, kind, (unsigned long long)digest);
         const lathe_mesh *mesh = lathe_decoder_mesh(decoder, step.structure);
         if (!CHECK(mesh != NULL)) break;
-        fprintf(meshes, "%s %u %u %u %u %016llx\n", name, step.level, step.structure, mesh->vertex_count, mesh->triangle_count,
+        fprintf(meshes, "%s %s %u %u %u %016llx\n", name, level, step.structure, mesh->vertex_count, mesh->triangle_count,
                 (unsigned long long)mesh_digest(mesh));
-        CHECK(steps < r.count && step.level == r.packets[steps].level && step.structure == r.packets[steps].structure);
-        steps++;
+        CHECK(at < r.count && step.level == r.packets[at].level && step.structure == r.packets[at].structure + steps);
+        if (at < r.count && ++steps == r.packets[at].steps) at++, steps = 0;
     }
     if (!CHECK(status == LATHE_MORE)) fprintf(stderr, "%s: %s\n", name, lathe_decoder_error(decoder));
-    CHECK_EQ(steps, r.count);
+    CHECK_EQ(at, r.count);
     lathe_decoder_close(&decoder);
     lathe_model *model;
     lathe_error err = {""};
@@ -344,17 +364,18 @@ static void every_prefix(const file *f) {
     lathe_step step;
     if (lathe_decoder_open(&decoder)) abort();
     lathe_decoder_build_meshes(decoder, false);
+    lathe_decoder_every_pass(decoder, true);
     CHECK_EQ(lathe_decoder_step(decoder, &step), LATHE_MORE);
-    uint32_t steps = 0, wrong = 0;
+    uint32_t packets = 0, wrong = 0;
     for (size_t at = 0; at < r.stream; at++) {
         wrong += lathe_decoder_feed(decoder, f->bytes + at, 1) != LATHE_OK;
-        bool complete = steps < r.count && at + 1 == r.packets[steps].end;
-        wrong += lathe_decoder_step(decoder, &step) != (complete ? LATHE_OK : LATHE_MORE);
-        steps += complete;
-        if (complete) wrong += lathe_decoder_step(decoder, &step) != LATHE_MORE;
+        bool complete = packets < r.count && at + 1 == r.packets[packets].end;
+        for (uint32_t i = 0; complete && i < r.packets[packets].steps; i++) wrong += lathe_decoder_step(decoder, &step) != LATHE_OK;
+        packets += complete;
+        wrong += lathe_decoder_step(decoder, &step) != LATHE_MORE;
     }
     CHECK_EQ(wrong, 0);
-    CHECK_EQ(steps, r.count);
+    CHECK_EQ(packets, r.count);
     CHECK(!*lathe_decoder_error(decoder));
     lathe_decoder_close(&decoder);
 }
@@ -380,7 +401,8 @@ static bool named(const records *r, const lathe_model_info *info, size_t at, con
     for (uint32_t i = 0; i < r->count; i++) {
         if (at < r->packets[i].begin || at >= r->packets[i].end) continue;
         char who[160];
-        snprintf(who, sizeof who, "level %u of structure '%s'", r->packets[i].level, info->structures[r->packets[i].structure].name);
+        snprintf(who, sizeof who, "level %u of structure '%s'", r->packets[i].level,
+                 r->packets[i].steps > 1 ? "all" : info->structures[r->packets[i].structure].name);
         return strstr(text, who) != NULL;
     }
     if (at < LATHE_MAGIC_SIZE) return strstr(text, "not a Lathe archive") || strstr(text, "another version");
@@ -424,18 +446,19 @@ static void flipped_streams(const file *f) {
     lathe_header header = find_records(&r, f);
     lathe__header_free(&header);
     for (size_t at = 0; at < r.stream; at += EVERY) {
-        uint32_t before = 0, steps = 0;
-        while (before < r.count && r.packets[before].end <= at) before++;
+        uint32_t before = 0, steps = 0, expected = 0;
+        for (; before < r.count && r.packets[before].end <= at; before++) expected += r.packets[before].steps;
         lathe_decoder *decoder;
         lathe_step step;
         if (lathe_decoder_open(&decoder)) abort();
         lathe_decoder_build_meshes(decoder, false);
+        lathe_decoder_every_pass(decoder, true);
         f->bytes[at] ^= (uint8_t)(1 << at % 8);
         if (lathe_decoder_feed(decoder, f->bytes, r.stream)) abort();
         f->bytes[at] ^= (uint8_t)(1 << at % 8);
         lathe_status status;
         while (!(status = lathe_decoder_step(decoder, &step))) steps++;
-        CHECK_EQ(steps, before);
+        CHECK_EQ(steps, expected);
         CHECK(status == LATHE_MORE || *lathe_decoder_error(decoder));
         if (before < r.count && at >= r.packets[before].begin) CHECK_EQ(status, LATHE_ERR_CHECKSUM);
         lathe_decoder_close(&decoder);

@@ -67,6 +67,7 @@ function bake(name, input, ...options) {
 }
 
 mkdirSync(folder, { recursive: true });
+/* Streams without a kept topology and without radius maps were baked before there were pyramids: today the same calls give those. */
 const rough = foam(5), fine = foam(3);
 const blob = (x, y, z) => ball(x - 19, y - 18, z - 16, 13) / 8 + 1.5 * rough(x, y, z) + 0.5 * fine(x, y, z);
 const label = (x, y, z) => {
@@ -103,4 +104,22 @@ bake('long_back', raw('long_back', [40, 44, 80], (x, y, z) => cone(y, x, z / 3 +
 bake('sizes', raw('sizes', [110, 90, 8], (x, y, z) => (Math.abs(Math.hypot(x - 50, y - 45) - 35) < 6 + 2 * rough(x, y, z) ? -3 : ball(x - 50, y - 45, z * 2 - 8, 9) > 0 ? 12 :
     x > 100 && y > 60 && z > 2 ? 40 : 0)), '--labels', 'all');
 bake('thin', raw('thin', [20, 16, 1], (x, y) => ball(x - 9, y - 8, 0, 6) + rough(x, y, 3)), '--iso', '0');
+/* Pyramids. */
+bake('pyramid_caps', raw('pyramid_caps', [34, 31, 27], (x, y, z) => blob(x + 3, y + 3, z + 3)), '--iso', '0', '--exact');
+bake('pyramid_shared', raw('pyramid_shared', [56, 37, 29], label), '--labels', 'all');
+bake('pyramid_independent', raw('pyramid_independent', [56, 37, 29], label, [1, 1, 1.1]), '--labels', 'all', '--independent', '--axis', 'x');
+bake('pyramid_thick', raw('pyramid_thick', [60, 50, 7], (x, y, z) => ball(x - 30, y - 25, 6 * (z - 3), 22) + 3 * rough(x, y, 6 * z), [0.5, 0.7, 4]), '--iso', '0', '--exact');
+bake('pyramid_specks', raw('pyramid_specks', [40, 40, 40], (x, y, z) => (ball(x - 14, y - 15, z - 15, 12) > 0 ? 1 : ball(x - 35, y - 34, z - 35, 1.2) > 0 ? 2 : x === 38 && y === 3 && z === 9 ? 3 : 0)), '--labels', 'all');
+bake('pyramid_slice', raw('pyramid_slice', [40, 32, 1], (x, y) => ball(x - 18, y - 16, 0, 13) + 3 * rough(x, y, 3)), '--iso', '0', '--exact');
+bake('pyramid_oblique', nifti('pyramid_oblique', [34, 31, 27], (x, y, z) => 100 + 60 * blob(x + 2, y + 3, z + 3), tilt), '--iso', '100', '--exact', '--axis', 'y');
+bake('pyramid_wide', raw('pyramid_wide', [150, 131, 3], disc(55, 150)), '--iso', '0', '--exact');
+bake('pyramid_one', raw('pyramid_one', [30, 28, 20], (x, y, z) => blob(x + 5, y + 5, z + 6)), '--iso', '0', '--levels', '1');
+/* Tubes: a hole that parts into two; one tube alone. */
+const trunk = (x, y, z) => Math.min(17 - Math.hypot(x - 22, (y - 22) * 1.2), z - 2, 41 - z);
+const vessel = (x, y, z) => {
+    const apart = Math.max(0, z - 20) / 3;
+    return 4 - Math.min(Math.hypot(x - 22 - apart, y - 22), Math.hypot(x - 22 + apart, y - 22));
+};
+bake('tubes', raw('tubes', [46, 46, 44], (x, y, z) => Math.min(trunk(x, y, z), -Math.min(vessel(x, y, z), z - 7, 36 - z))), '--iso', '0');
+bake('tube', raw('tube', [36, 38, 33], (x, y, z) => cone(x, y, z) + 0.4), '--iso', '0');
 rmSync(scratch, { recursive: true });

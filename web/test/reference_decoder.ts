@@ -70,8 +70,10 @@ export interface Box { origin: number[]; size: number[]; levelCount: number }
 export interface Header {
     axis: number; boundary: number; affine: number[][]; parameters: number[]; structures: Box[];
     levelCount: number; fraction: number; flags: number;
+    /** Of a pyramid: the axes that each level's passes halve; -1: its first raster. */
+    passes: number[][] | null;
 }
-export const CAPS = 1, KEEP = 2, SHARED = 4, EXACT = 8;
+export const CAPS = 1, KEEP = 2, SHARED = 4, EXACT = 8, PYRAMID = 16;
 const MAGIC = [0x89, 0x4c, 0x54, 0x48, 0x0d, 0x0a, 0x1a, 2];
 
 function readAffine(c: Cursor): number[][] {
@@ -99,6 +101,20 @@ function readBox(c: Cursor, before: number[]): Box {
     return { origin, size, levelCount };
 }
 
+function readSchedule(c: Cursor, parameters: number[], structures: Box[]): number[][] {
+    const passes: number[][] = [[-1]], strides = [1, 1, 1];
+    c.must(parameters.length >= 2 && parameters.length <= 13, 'the number of levels');
+    c.must(structures.every((s) => s.levelCount === parameters.length - 1), 'a level count');
+    for (let code of parameters.slice(2)) {
+        const axes: number[] = [];
+        for (; code > 0; code = Math.floor(code / 4)) axes.push((code % 4) - 1);
+        c.must(axes.length >= 1 && axes.length <= 15 && !axes.includes(-1), 'the passes of a level');
+        for (const axis of axes) c.must((strides[axis] *= 2) <= 4096, 'a stride');
+        passes.push(axes);
+    }
+    return passes;
+}
+
 function readBody(c: Cursor): Header {
     const flags = c.u8();
     c.must(flags < 8 && (flags & 3) < 3, 'flags');
@@ -112,6 +128,7 @@ function readBody(c: Cursor): Header {
     return {
         axis: flags & 3, boundary: flags >> 2, affine, parameters, structures, levelCount: Math.max(...structures.map((s) => s.levelCount)),
         fraction: (parameters[0] ?? 32) & 63, flags: parameters[1] ?? 0,
+        passes: (parameters[1] ?? 0) & PYRAMID ? readSchedule(c, parameters, structures) : null,
     };
 }
 
@@ -129,7 +146,18 @@ function readHeader(bytes: Uint8Array): [Header, number] {
     }
 }
 
-export interface LevelHead { level: number; rms: number; max: number; structures: number[]; sizes: number[] }
+/** Whose packet: structure -1 stands for all. */
+export interface Owner { structure: number; pass: number }
+export interface LevelHead { level: number; rms: number; max: number; owners: Owner[]; sizes: number[] }
+
+const nameOf = (level: number, structure: number): string =>
+    structure < 0 ? `level ${level} of all structures` : `level ${level} of structure ${structure}`;
+
+function ownersOf(header: Header, level: number): Owner[] {
+    const present = header.structures.flatMap((s, i) => (s.levelCount > level ? [i] : []));
+    if (!header.passes) return present.map((structure) => ({ structure, pass: 0 }));
+    return header.passes[level].flatMap((_, pass) => (header.flags & SHARED ? [-1] : present).map((structure) => ({ structure, pass })));
+}
 
 function readLevelHead(c: Cursor, header: Header, level: number): LevelHead {
     const start = c.at;
@@ -137,13 +165,13 @@ function readLevelHead(c: Cursor, header: Header, level: number): LevelHead {
     c.must(c.varint() === level, 'its number');
     const rms = c.f32(), max = c.f32(), count = c.varint();
     c.must(Math.abs(rms) <= Math.fround(1e30) && Math.abs(max) <= Math.fround(1e30), 'the error');
-    const structures = header.structures.flatMap((s, i) => (s.levelCount > level ? [i] : []));
-    c.must(count === structures.length, 'the number of packets');
+    const owners = ownersOf(header, level);
+    c.must(count === owners.length, 'the number of packets');
     if (count > c.left) throw new Incomplete();
-    const sizes = structures.map(() => c.varint());
+    const sizes = owners.map(() => c.varint());
     c.must(sizes.every((size) => size <= 2 ** 30), 'the size of a packet');
     c.checksum(start);
-    return { level, rms, max, structures, sizes };
+    return { level, rms, max, owners, sizes };
 }
 
 // ---- range decoder and adaptive numbers ----
@@ -546,90 +574,96 @@ function freshModel(area: number): OccupancyModel {
 
 // ---- radius maps ----
 
-export class RadiusMap {
-    readonly rays: number;
-    readonly step: number;
-    readonly turn: number;
-    readonly apex: number[];
-    readonly centres: Point[];
-    readonly radii: Int32Array[];
-    private readonly magnitudes: Uint8Array[];
-    private readonly centreContext = new NumberContext(3, 24, 77);
-    private readonly contexts = [0, 1, 2].map((kind) =>
+class RadiusContexts {
+    readonly centre = new NumberContext(3, 24, 77);
+    readonly start = new NumberContext(3, 200, 200);
+    readonly radius = [0, 1, 2].map((kind) =>
         [8, 24, 64, 100, 128, 154, 192, 216, 240].map((usual) => new NumberContext(3, kind ? usual : 250, kind ? 77 : 180)));
+}
 
-    constructor(d: RangeDecoder, readonly plan: Plan, private readonly farthest: number) {
-        const m = new NumberContext(2), log = m.read(d) + 6;
-        d.must(log >= 3 && log <= 10, 'the rays of a radius map');
-        this.rays = 2 ** log;
-        this.step = m.read(d);
-        this.turn = m.read(d);
-        this.apex = [4 + m.read(d), 4 + m.read(d)];
-        d.must(this.step >= 1 && this.step <= 65536 && Math.abs(this.turn) <= 32768, 'the step or the turn');
-        d.must(this.apex.every((a) => a >= 1 && a <= 7), 'an apex');
-        d.must(plan.slices * this.rays <= 2 ** 24, 'a radius map is too large');
-        this.centres = Array.from({ length: plan.slices }, () => [0, 0]);
-        this.radii = this.centres.map(() => new Int32Array(this.rays));
-        this.magnitudes = this.centres.map(() => new Uint8Array(this.rays));
+/** Rows of centres and radii, refined pass by pass; a simple map's passes are its levels. */
+class RadiusImage {
+    centres: Point[];
+    radii: Int32Array[];
+    private magnitudes: Uint8Array[];
+
+    /** start: of a tube, what its first centre and radius are predicted to be. */
+    constructor(readonly slices: number, readonly passes: number, readonly rays: number, private readonly contexts: RadiusContexts,
+        private readonly farthest: number, private readonly start: { centre: Point; radius: number } | null) {
+        this.centres = Array.from({ length: slices }, () => [0, 0]);
+        this.radii = this.centres.map(() => new Int32Array(rays));
+        this.magnitudes = this.centres.map(() => new Uint8Array(rays));
     }
 
-    get last(): number { return this.plan.slices - 1; }
-    rayStride(level: number): number { return Math.min(this.plan.stride(level), this.rays / 8); }
-    rows(level: number): number[] {
-        const stride = this.plan.stride(level), rows: number[] = [];
+    copy(): RadiusImage {
+        const to = new RadiusImage(this.slices, this.passes, this.rays, this.contexts, this.farthest, this.start);
+        to.centres = this.centres.map(([u, v]) => [u, v]);
+        to.radii = this.radii.map((r) => r.slice());
+        to.magnitudes = this.magnitudes.map((m) => m.slice());
+        return to;
+    }
+
+    get last(): number { return this.slices - 1; }
+    stride(pass: number): number { return 2 ** (this.passes - 1 - pass); }
+    rayStride(pass: number): number { return Math.min(this.stride(pass), this.rays / 8); }
+    rows(pass: number): number[] {
+        const stride = this.stride(pass), rows: number[] = [];
         for (let row = 0; row < this.last; row += stride) rows.push(row);
         return [...rows, this.last];
     }
 
-    /** The numbers of one level. */
-    read(d: RangeDecoder, level: number): void {
-        let step = this.step;
-        for (let l = level; l + 1 < this.plan.levelCount; l++) if (step > 3) step = Math.floor((step * 3) / 4);
-        if (level === 0) this.rows(0).forEach((row, i, all) => this.firstRow(d, step, row, i ? all[i - 1] : -1));
+    /** The numbers of one pass; without a decoder all are 0. */
+    read(d: RangeDecoder | null, pass: number, step: number): void {
+        if (pass === 0) this.rows(0).forEach((row, i, all) => this.firstRow(d, step, row, i ? all[i - 1] : -1));
         else {
-            const s = this.plan.stride(level), known = this.rayStride(level - 1), rays = this.rayStride(level);
+            const s = this.stride(pass), known = this.rayStride(pass - 1), rays = this.rayStride(pass);
             for (let row = s; row < this.last; row += 2 * s) this.newRow(d, step, row, s, known);
-            if (rays < known) this.rows(level).forEach((row, i, all) =>
+            if (rays < known) this.rows(pass).forEach((row, i, all) =>
                 this.newRays(d, step, row, i ? all[i - 1] : -1, row % (2 * s) !== 0 && row !== this.last, rays));
         }
-        d.present();
+        d?.present();
     }
 
-    private centre(d: RangeDecoder, row: number, predicted: Point): void {
+    private centre(d: RangeDecoder | null, row: number, predicted: Point, context = this.contexts.centre): void {
         this.centres[row] = predicted.map((p) => {
-            const number = this.centreContext.read(d);
-            d.must(Math.abs(number) <= 2 ** 14, 'a centre');
+            const number = d ? context.read(d) : 0;
+            d?.must(Math.abs(number) <= 2 ** 14, 'a centre');
             return p + number;
         }) as Point;
     }
 
-    private radius(d: RangeDecoder, step: number, kind: number, near: number, row: number, i: number, predicted: number): void {
-        const kindOf = [1, 3, 6, 10, 16, 25, 40, 80].filter((limit) => limit <= near).length, number = this.contexts[kind][kindOf].read(d);
+    private radius(d: RangeDecoder | null, step: number, kind: number, near: number, row: number, i: number, predicted: number): void {
+        const kindOf = [1, 3, 6, 10, 16, 25, 40, 80].filter((limit) => limit <= near).length;
+        const number = d ? this.contexts.radius[kind][kindOf].read(d) : 0;
         this.magnitudes[row][i] = Math.min(Math.abs(number), 127);
-        const r = predicted + number * step;
-        d.must(r <= this.farthest, 'a radius');
+        let r = predicted + number * step;
+        if (this.start) r = Math.min(r, this.farthest);
+        else d?.must(r <= this.farthest, 'a radius');
         this.radii[row][i] = Math.max(r, 16);
     }
 
-    private firstRow(d: RangeDecoder, step: number, row: number, before: number): void {
+    private firstRow(d: RangeDecoder | null, step: number, row: number, before: number): void {
         const q = this.rayStride(0), r = this.radii[row], b = this.radii[before];
-        this.centre(d, row, before < 0 ? [0, 0] : this.centres[before]);
+        if (before < 0 && this.start) this.centre(d, row, this.start.centre, this.contexts.start);
+        else this.centre(d, row, before < 0 ? [0, 0] : this.centres[before]);
         for (let i = 0; i < this.rays; i += q) {
-            const predicted = before < 0 ? (i ? r[i - q] : 1024) : i ? Math.trunc((r[i - q] + 2 * b[i] - b[i - q]) / 2) : b[0];
+            const first = this.start ? this.start.radius : 1024;
+            const predicted = before < 0 ? (i ? r[i - q] : first) : i ? Math.trunc((r[i - q] + 2 * b[i] - b[i - q]) / 2) : b[0];
             this.radius(d, step, 0, 0, row, i, predicted);
         }
     }
 
     private magnitude(row: number, i: number): number { return this.magnitudes[row][(i + this.rays) % this.rays]; }
 
-    private newRow(d: RangeDecoder, step: number, row: number, s: number, q: number): void {
+    private newRow(d: RangeDecoder | null, step: number, row: number, s: number, q: number): void {
         const l = row - s, h = Math.min(row + s, this.last), r = this.radii;
         const between = (a: number, b: number): number =>
             Math.trunc((a * (h - row) * 2 + b * (row - l) * 2 + h - l) / (2 * (h - l)));
+        const round = (a: number, b: number): number => Math.floor(Math.sqrt(Math.floor((a * a * (h - row) + b * b * (row - l)) / (h - l))));
         this.centre(d, row, [0, 1].map((k) => between(this.centres[l][k], this.centres[h][k])) as Point);
-        const cubic = l - 2 * s >= 0 && h + 2 * s <= this.last && h - row === s;
+        const cubic = l - 2 * s >= 0 && h + 2 * s <= this.last && h - row === s, straight = this.start ? round : between;
         for (let i = 0; i < this.rays; i += q) {
-            const predicted = cubic ? (9 * (r[l][i] + r[h][i]) - r[l - 2 * s][i] - r[h + 2 * s][i] + 8) >> 4 : between(r[l][i], r[h][i]);
+            const predicted = cubic ? (9 * (r[l][i] + r[h][i]) - r[l - 2 * s][i] - r[h + 2 * s][i] + 8) >> 4 : straight(r[l][i], r[h][i]);
             let near = i > 0 ? 10 * this.magnitude(row, i - q) : 0;
             if (i > q) near += 5 * this.magnitude(row, i - 2 * q);
             const below = row - 2 * s;
@@ -638,7 +672,7 @@ export class RadiusMap {
         }
     }
 
-    private newRays(d: RangeDecoder, step: number, row: number, before: number, fresh: boolean, q: number): void {
+    private newRays(d: RangeDecoder | null, step: number, row: number, before: number, fresh: boolean, q: number): void {
         const r = (i: number): number => this.radii[row][(i + this.rays) % this.rays];
         for (let i = q; i < this.rays; i += 2 * q) {
             const predicted = (9 * (r(i - q) + r(i + q)) - r(i - 3 * q) - r(i + 3 * q) + 8) >> 4;
@@ -652,15 +686,149 @@ export class RadiusMap {
     }
 }
 
+/** Step behind `times` levels below the one that it is the step of. */
+const fallen = (step: number, times: number, eighths: number): number => {
+    for (; times > 0; times--) if (step > 3) step = Math.floor((step * eighths) / 8);
+    return step;
+};
+
+/** One loop in each slice. */
+export class SimpleMap {
+    readonly step: number;
+    readonly turn: number;
+    readonly apex: number[];
+    readonly image: RadiusImage;
+
+    constructor(d: RangeDecoder, m: NumberContext, log: number, plan: Plan, farthest: number) {
+        d.must(log >= 3 && log <= 10, 'the rays of a radius map');
+        this.step = m.read(d);
+        this.turn = m.read(d);
+        this.apex = [4 + m.read(d), 4 + m.read(d)];
+        d.must(this.step >= 1 && this.step <= 65536 && Math.abs(this.turn) <= 32768, 'the step or the turn');
+        d.must(this.apex.every((a) => a >= 1 && a <= 7), 'an apex');
+        d.must(plan.slices * 2 ** log <= 2 ** 24, 'a radius map is too large');
+        this.image = new RadiusImage(plan.slices, plan.levelCount, 2 ** log, new RadiusContexts(), farthest, null);
+    }
+
+    read(d: RangeDecoder, level: number): void { this.image.read(d, level, fallen(this.step, this.image.passes - 1 - level, 6)); }
+}
+
+export interface Tube { first: number; rows: number; rays: number; hole: boolean; image: RadiusImage | null }
+
+/** Several of them, or one with more to say. */
+export class Tubes {
+    /** Numbers of the steps, and the steps. */
+    readonly steps: number[];
+    private readonly step: number;
+    private readonly fineStep: number;
+    readonly fall: number;
+    readonly fine: number;
+    readonly turn: number;
+    readonly apex: number[];
+    readonly tubes: Tube[] = [];
+    private readonly contexts = new RadiusContexts();
+    private readonly kinds = new Map<string, NumberContext>();
+
+    constructor(d: RangeDecoder, private readonly plan: Plan, private readonly box: number[]) {
+        const number = (kind: string): number => {
+            if (!this.kinds.has(kind)) this.kinds.set(kind, new NumberContext(2));
+            return (this.kinds.get(kind) as NumberContext).read(d);
+        };
+        const within = (value: number, least: number, most: number, what: string): number => {
+            d.must(value >= least && value <= most, what);
+            return value;
+        };
+        const stepOf = (k: number): number => (8 + (k % 8)) * 2 ** Math.floor(k / 8);
+        const count = within(1 + number('count'), 1, 8, 'the number of tubes'), k = within(32 + number('step'), 0, 79, 'the step');
+        this.step = stepOf(k);
+        this.fall = within(6 + number('fall'), 3, 8, 'the fall');
+        this.fine = within(number('fine'), 0, plan.levelCount - 1, 'the fine level');
+        const fine = this.fine ? within(k - number('step'), 0, 79, 'the fine step') : k;
+        this.fineStep = stepOf(fine);
+        this.steps = [k, fine];
+        this.turn = within(number('turn'), -32768, 32768, 'the turn');
+        this.apex = [0, 1].map(() => within(4 + number('apex'), 1, 7, 'an apex'));
+        let log = 6, samples = 0;
+        for (let i = 0; i < count; i++) {
+            const before = this.tubes[i - 1], n = within(number('first'), 0, plan.slices, 'where a tube begins');
+            const first = !before ? Math.max(n - 1, 0) : n === 0 ? before.first : n === 1 ? before.first + before.rows : before.first + n - 1;
+            const rows = within(plan.slices - first - number('rows'), 1, plan.slices - first, 'the rows of a tube');
+            log = within(log + number('rays'), 3, count === 1 ? 10 : 8, 'the rays of a tube');
+            samples += rows * 2 ** log;
+            d.must(samples <= 2 ** 22, 'the tubes are too large');
+            this.tubes.push({ first, rows, rays: 2 ** log, hole: number('hole') !== 0, image: null });
+        }
+    }
+
+    private passes(tube: Tube): number {
+        let passes = this.plan.levelCount;
+        while (2 ** (passes - 1) < tube.rows - 1) passes++;
+        return passes;
+    }
+
+    private startOf(i: number): { centre: Point; radius: number } {
+        const [width, height] = this.box, tube = this.tubes[i];
+        if (!i) return { centre: [width - 1, height - 1], radius: Math.floor((64 * (width + height)) / 4) };
+        let from = this.tubes[i - 1], row = 0;
+        for (const t of this.tubes.slice(0, i)) if (t.hole === tube.hole && t.first + t.rows === tube.first) [from, row] = [t, t.rows - 1];
+        const image = from.image as RadiusImage, [u, v] = image.centres[row];
+        return { centre: [u, v], radius: Math.floor(image.radii[row][0] / 2) };
+    }
+
+    read(d: RangeDecoder, level: number): void {
+        this.tubes.forEach((tube, i) => {
+            const passes = this.passes(tube), last = passes - this.plan.levelCount + level;
+            tube.image ??= new RadiusImage(tube.rows, passes, tube.rays, this.contexts, 64 * (this.box[0] + this.box[1]), this.startOf(i));
+            for (let pass = level ? last : 0; pass <= last; pass++) {
+                const fine = this.fine > 0 && pass >= passes - this.plan.levelCount + this.fine;
+                tube.image.read(d, pass, fallen(fine ? this.fineStep : this.step, passes - 1 - pass, this.fall));
+            }
+        });
+    }
+
+    /** All rows and rays, those to come predicted. */
+    shown(tube: Tube, level: number): RadiusImage {
+        const image = (tube.image as RadiusImage).copy(), passes = image.passes;
+        for (let pass = passes - this.plan.levelCount + level + 1; pass < passes; pass++) image.read(null, pass, 1);
+        return image;
+    }
+
+    /** Is the surface one of strips? */
+    get single(): boolean { return this.tubes.length === 1 && !this.tubes[0].hole && this.tubes[0].rows === this.plan.slices; }
+
+    strideAt(level: number): number { return this.plan.stride(level); }
+    shownSlices(level: number): number[] {
+        const s = this.plan.stride(level), slices = new Set<number>([this.plan.slices - 1]);
+        for (let w = 0; w < this.plan.slices; w += s) slices.add(w);
+        for (const { first, rows } of this.tubes) {
+            const last = first + rows - 1;
+            slices.add(first).add(last);
+            for (let k = 1; k < s; k *= 2) {
+                if (first + k < last) slices.add(first + k);
+                if (last - k > first) slices.add(last - k);
+            }
+        }
+        return [...slices].sort((a, b) => a - b);
+    }
+}
+
 export interface Mesh { vertices: number[][]; triangles: number[][] }
 
-export function radiusMesh(map: RadiusMap, level: number): Mesh {
-    const q = map.rayStride(level), n = map.rays / q, vertices: number[][] = [], triangles: number[][] = [], rows = map.rows(level);
+export function radiusMesh(packet: Packet & { kind: 'radii' }, level: number): Mesh | null {
+    const { map } = packet;
+    if (map instanceof SimpleMap) return stripMesh(map.image, map.turn, map.apex, map.image.rows(level), map.image.rayStride(level));
+    if (!map.single) return null;
+    const s = map.shownSlices(level), rays = map.tubes[0].rays, stride = Math.max(map.strideAt(level) / 2, 1);
+    return stripMesh(map.shown(map.tubes[0], level), map.turn, map.apex, s, Math.min(stride, rays / 8));
+}
+
+function stripMesh(map: RadiusImage, turn: number, apex: number[], rows: number[], q: number): Mesh {
+    const n = map.rays / q, vertices: number[][] = [], triangles: number[][] = [];
     const distance = (a: number, b: number): bigint =>
         [0, 1].reduce((sum, k) => sum + BigInt(vertices[a][k] - vertices[b][k]) ** 2n, 0n);
     rows.forEach((row, order) => {
         for (let i = 0; i < map.rays; i += q) {
-            const angle = (i * (65536 / map.rays) + map.turn * row) % 65536, d = direction((angle + 65536) % 65536, 65536);
+            const angle = (i * (65536 / map.rays) + turn * row) % 65536, d = direction((angle + 65536) % 65536, 65536);
             vertices.push([...[0, 1].map((k) => map.centres[row][k] * 32768 + Math.trunc((map.radii[row][i] * 1024 * d[k]) / 16384)), row * 65536]);
         }
         for (let k = 0; order && k < n; k++) {
@@ -670,11 +838,11 @@ export function radiusMesh(map: RadiusMap, level: number): Mesh {
         }
     });
     for (const [side, row, first] of [[0, 0, 0], [1, map.last, (rows.length - 1) * n]]) {
-        const apex = vertices.length;
-        vertices.push([...map.centres[row].map((c) => c * 32768), row * 65536 + (side ? 8192 : -8192) * map.apex[side]]);
+        const tip = vertices.length;
+        vertices.push([...map.centres[row].map((c) => c * 32768), row * 65536 + (side ? 8192 : -8192) * apex[side]]);
         for (let k = 0; k < n; k++) {
             const a = first + k, b = first + ((k + 1) % n);
-            triangles.push(side ? [apex, a, b] : [apex, b, a]);
+            triangles.push(side ? [tip, a, b] : [tip, b, a]);
         }
     }
     return { vertices, triangles };
@@ -686,7 +854,8 @@ export function radiusMesh(map: RadiusMap, level: number): Mesh {
 export type Packet =
     | { kind: 'stars'; shown: number[]; stars: Star[][] }
     | { kind: 'slices'; shown: number[]; finer: number[]; slices: Slice[]; width: number; height: number; rest: number[] | null }
-    | { kind: 'radii'; map: RadiusMap };
+    | { kind: 'radii'; map: SimpleMap | Tubes }
+    | { kind: 'raster'; stride: number[]; size: number[]; bits: Uint8Array; rest: number[] | null };
 
 /** What adapts for all structures. */
 interface Shared { stars: NumberContext[]; model: OccupancyModel | null; area: number }
@@ -694,7 +863,7 @@ interface Shared { stars: NumberContext[]; model: OccupancyModel | null; area: n
 class Structure {
     level = -1;
     private readonly plan: Plan;
-    private map: RadiusMap | null = null;
+    private map: SimpleMap | Tubes | null = null;
     private stars: Star[][] | null = null;
     private firstSlices = 1;
     private readonly slices: (Slice | null)[];
@@ -707,8 +876,10 @@ class Structure {
 
     decode(payload: Uint8Array, record: string): Packet {
         const d = new RangeDecoder(payload, record), level = ++this.level;
-        if (level === 0 && !(this.flags & EXACT) && d.bit(8192))
-            this.map = new RadiusMap(d, this.plan, 64 * (this.box.size[0] + this.box.size[1]));
+        if (level === 0 && !(this.flags & EXACT) && d.bit(8192)) {
+            const m = new NumberContext(2), number = m.read(d), [width, height] = this.box.size;
+            this.map = number === 5 ? new Tubes(d, this.plan, this.box.size) : new SimpleMap(d, m, 6 + number, this.plan, 64 * (width + height));
+        }
         if (this.map) {
             this.map.read(d, level);
             return { kind: 'radii', map: this.map };
@@ -773,9 +944,83 @@ class Structure {
     }
 }
 
+// ---- pyramids ----
+
+class Pyramid {
+    level = -1;
+    private readonly stride: number[];
+    private size: number[] = [];
+    private bits = new Uint8Array(0);
+    private model: OccupancyModel | null = null;
+
+    constructor(private readonly box: Box, private readonly passes: number[][], private readonly flags: number, private readonly shared: Shared) {
+        this.stride = [0, 1, 2].map((axis) => 2 ** passes.flat().filter((a) => a === axis).length);
+    }
+
+    private sizeNow(): number[] {
+        const [width, height, slices] = this.box.size, [p, q, r] = this.stride;
+        return [Math.floor((width - 2 + p) / p) + 1, Math.floor((height - 2 + q) / q) + 1, Math.floor((slices - 1) / r) + 1];
+    }
+
+    private startModel(): OccupancyModel {
+        if (!(this.flags & SHARED)) return freshModel(this.box.size[0] * this.box.size[1]);
+        return (this.shared.model ??= freshModel(this.shared.area));
+    }
+
+    /** Halves the stride of an axis: old samples go to even numbers. */
+    private spread(axis: number): void {
+        const [a, b, c] = this.size, old = this.bits;
+        this.stride[axis] /= 2;
+        const size = (this.size = this.sizeNow()), to = (this.bits = new Uint8Array(size[0] * size[1] * size[2]));
+        for (let k = 0; k < c; k++)
+            for (let j = 0; j < b; j++)
+                for (let i = 0; i < a; i++) {
+                    if (!old[(k * b + j) * a + i]) continue;
+                    const at = [i, j, k].map((x, n) => (n === axis ? 2 * x : x));
+                    to[(at[2] * size[1] + at[1]) * size[0] + at[0]] = 1;
+                }
+    }
+
+    /** The planes across an axis: their size, how many, and where a pixel of one is in the raster (-1: margin). */
+    private planes(axis: number): { width: number; height: number; count: number; at: (c: number, x: number, y: number) => number } {
+        const [a, b, c] = this.size, at = (i: number, j: number, k: number): number => (k < 0 || k >= c ? -1 : (k * b + j) * a + i);
+        if (axis === 0) return { width: b, height: c + 2, count: a, at: (n, x, y) => at(n, x, y - 1) };
+        if (axis === 1) return { width: a, height: c + 2, count: b, at: (n, x, y) => at(x, n, y - 1) };
+        return { width: a, height: b, count: c, at: (n, x, y) => at(x, y, n) };
+    }
+
+    decode(d: RangeDecoder, level: number, pass: number): Packet {
+        const axis = this.passes[level][pass], first = axis < 0;
+        this.model ??= this.startModel();
+        if (first) this.bits = new Uint8Array((this.size = this.sizeNow()).reduce((x, y) => x * y));
+        else this.spread(axis);
+        const { width, height, count, at } = this.planes(axis), model = this.model;
+        const plane = (c: number): Slice | null => {
+            if (c < 0 || c >= count) return null;
+            const out = new Uint8Array(width * height);
+            for (let y = 0; y < height; y++) for (let x = 0; x < width; x++) out[y * width + x] = at(c, x, y) < 0 ? 0 : this.bits[at(c, x, y)];
+            return out;
+        };
+        const end = axis === 0 || axis === 1 ? count - 1 : count;
+        for (let c = first ? 0 : 1; c < end; c += first ? 1 : 2) {
+            const below = plane(c - 1), above = first ? null : plane(c + 1), mode = (below ? 1 : 0) + (above ? 1 : 0);
+            model.code(width, height, { below, above, mode }, (p) => d.bit(p)).forEach((bit, n) => {
+                if (bit) this.bits[at(c, n % width, Math.floor(n / width))] = 1;
+            });
+            d.present();
+        }
+        if (pass + 1 === this.passes[level].length) this.level = level;
+        const whole = this.level + 1 === this.passes.length, caps = whole && this.flags & CAPS && !(this.flags & SHARED);
+        return {
+            kind: 'raster', stride: [...this.stride], size: this.size, bits: this.bits, rest: caps ? [d.code, d.range, d.left, d.missing] : null,
+        };
+    }
+}
+
 // ---- streams ----
 
-export interface Step { level: number; structure: number; rms: number; max: number; packet: Packet }
+/** passesLeft: until the level is whole. */
+export interface Step { level: number; structure: number; passesLeft: number; rms: number; max: number; packet: Packet }
 
 /** Takes a stream in any portions; step() gives the next packet's content, or null while that is not all there. */
 export class Decoder {
@@ -785,7 +1030,9 @@ export class Decoder {
     private head: LevelHead | null = null;
     private level = 0;
     private next = 0;
-    private structures: Structure[] = [];
+    private structures: (Structure | Pyramid)[] = [];
+    /** A packet of all structures that is being decoded, and whose turn it is. */
+    private open: { d: RangeDecoder; turn: number } | null = null;
 
     feed(bytes: Uint8Array): void {
         const more = new Uint8Array(this.bytes.length - this.at + bytes.length);
@@ -806,7 +1053,8 @@ export class Decoder {
 
     private start(header: Header): void {
         const shared: Shared = { stars: starContexts(), model: null, area: Math.max(...header.structures.map((s) => s.size[0] * s.size[1])) };
-        this.structures = header.structures.map((box) => new Structure(box, header.flags, shared));
+        this.structures = header.structures.map((box) =>
+            header.passes ? new Pyramid(box, header.passes, header.flags, shared) : new Structure(box, header.flags, shared));
         this.header = header;
     }
 
@@ -825,16 +1073,27 @@ export class Decoder {
             this.at = c.at;
             this.next = 0;
         }
-        const { structures, sizes, level, rms, max } = this.head, structure = structures[this.next];
-        const record = `level ${level} of structure ${structure}`, c = new Cursor(this.bytes, this.at, record);
-        const payload = c.block(sizes[this.next]);
-        c.checksum(this.at);
-        this.at = c.at;
-        if (++this.next === structures.length) {
-            this.head = null;
-            this.level++;
+        const { owners, sizes, level, rms, max } = this.head, { structure: owner, pass } = owners[this.next], record = nameOf(level, owner);
+        let payload: Uint8Array | null = null;
+        if (!this.open) {
+            const c = new Cursor(this.bytes, this.at, record);
+            payload = c.block(sizes[this.next]);
+            c.checksum(this.at);
+            this.at = c.at;
         }
-        return { level, structure, rms, max, packet: this.structures[structure].decode(payload, record) };
+        if (owner < 0) this.open ??= { d: new RangeDecoder(payload as Uint8Array, record), turn: 0 };
+        const structure = this.open ? this.open.turn++ : owner, of = this.structures[structure];
+        const passesLeft = header.passes ? header.passes[level].length - 1 - pass : 0;
+        if (!this.open || this.open.turn === this.structures.length) {
+            if (++this.next === owners.length) {
+                this.head = null;
+                this.level++;
+            }
+        }
+        const packet = of instanceof Structure ? of.decode(payload as Uint8Array, record)
+            : of.decode(this.open ? this.open.d : new RangeDecoder(payload as Uint8Array, record), level, pass);
+        if (this.open?.turn === this.structures.length) this.open = null;
+        return { level, structure, passesLeft, rms, max, packet };
     }
 }
 
@@ -885,7 +1144,7 @@ function checkStream(stream: Uint8Array): [Header, number[]] {
         const head = readLevelHead(Object.assign(c, { record: `level ${level}` }), header, level);
         head.sizes.forEach((bytes, i) => {
             const start = c.at;
-            Object.assign(c, { record: `level ${level} of structure ${head.structures[i]}` });
+            Object.assign(c, { record: nameOf(level, head.owners[i].structure) });
             c.block(bytes);
             c.checksum(start);
         });
