@@ -301,7 +301,7 @@ static lathe_status encode_pass(bake *b, size_t index, lathe_range_encoder *e, u
         grey_values grey;
         lathe_encode_source source = source_of(b, &grey, &state->mask);
         state->stride[0] = state->stride[1] = state->stride[2] = 1;
-        status = lathe__choose_caps(&baked->caps, state, b->arena, &source);
+        status = lathe__choose_caps(baked, state, b->arena, &source);
         if (!status) lathe__encode_caps(e, &baked->caps);
     }
     if (last) lathe__state_drop_occupancy(state);

@@ -6,6 +6,7 @@
 
 void lathe__cap_list_free(lathe_cap_list *list) {
     free(list->list);
+    free(list->squares);
     *list = (lathe_cap_list){.list = NULL};
 }
 
@@ -26,7 +27,20 @@ static uint32_t record(lathe_caps *caps, const lathe_mesh *mesh, uint32_t vertic
         l->capacity = capacity;
     }
     l->list[l->count++] = (struct lathe_cap){mesh->vertex_count, vertices, (uint8_t)side, 0};
-    return l->next;   /* the shape that is tried on all caps */
+    return 0;
+}
+
+static void record_chord(lathe_caps *caps, int64_t square) {
+    lathe_cap_list *l = (lathe_cap_list *)caps;
+    if (l->square_count == l->square_capacity) {
+        size_t capacity = l->square_capacity * 2 + 64;
+        int64_t *more = realloc(l->squares, capacity * sizeof *more);
+        l->failed |= !more;
+        if (!more) return;
+        l->squares = more;
+        l->square_capacity = capacity;
+    }
+    l->squares[l->square_count++] = square;
 }
 
 static double interpolate(const lathe_encode_source *source, double u, double v, int32_t w) {
@@ -49,62 +63,49 @@ static int32_t slice_of(const int32_t at[3], uint32_t side) {
     return side ? (at[2] + LATHE_LATTICE_ONE - 1) >> LATHE_LATTICE_BITS : at[2] >> LATHE_LATTICE_BITS;
 }
 
-enum { SHAPES = 8, STEEP = 4, FLAT = 7 };
-
-/* The rise of each shape, from the rises of the steepest and the flattest paraboloid: one of them is not clamped, if any is. */
-static void all_rises(double rise[SHAPES], double steep, double flat) {
-    static const double LEAST = LATHE_RISE_MIN / (double)LATHE_LATTICE_ONE, MOST = LATHE_RISE_MAX / (double)LATHE_LATTICE_ONE;
-    double square = steep < MOST ? steep * 2 : flat * 128;
-    for (int s = 0; s < SHAPES; s++) {
-        double bow = ldexp(square, 7 - 2 * s);
-        rise[s] = s < STEEP ? (2 * s + 1) / 8.0 : bow < LEAST ? LEAST : bow > MOST ? MOST : bow;
-    }
-}
-
-static double rise_over(const int32_t at[3], int32_t slice) { return fabs(at[2] / (double)LATHE_LATTICE_ONE - slice); }
-
-/* A shape other than that of the cap before must be worth its bits. */
-static void choose_shapes(lathe_cap_list *l, const lathe_mesh *steep, const lathe_mesh *flat, const lathe_encode_source *source) {
+/* A shape other than that of the cap before must be worth its bits. squares: of the cap's chords. */
+static void choose_shape(struct lathe_cap *cap, const lathe_mesh *mesh, const int64_t *squares, uint32_t before,
+                         const lathe_encode_source *source) {
+    enum { SHAPES = 8 };
     static const double WORTH = 0.0005;
-    uint32_t before = 0;
-    for (uint32_t i = 0; i < l->count; i++) {
-        struct lathe_cap *cap = &l->list[i];
-        double error[SHAPES] = {0}, rise[SHAPES];
-        for (uint32_t k = cap->first; k < cap->first + cap->vertices; k++) {
-            int32_t slice = slice_of(steep->lattice[k], cap->side);
-            double wanted = wanted_rise(source, steep->lattice[k], slice, cap->side);
-            all_rises(rise, rise_over(steep->lattice[k], slice), rise_over(flat->lattice[k], slice));
-            for (uint32_t s = 0; s < SHAPES; s++) error[s] += (rise[s] - wanted) * (rise[s] - wanted) + (s == before ? 0 : WORTH);
+    double error[SHAPES] = {0};
+    for (uint32_t k = 0; k < cap->vertices; k++) {
+        const int32_t *at = mesh->lattice[cap->first + k];
+        double wanted = wanted_rise(source, at, slice_of(at, cap->side), cap->side);
+        for (uint32_t s = 0; s < SHAPES; s++) {
+            double off = lathe__cap_rise(s, squares[k]) / (double)LATHE_LATTICE_ONE - wanted;
+            error[s] += off * off + (s == before ? 0 : WORTH);
         }
-        for (uint32_t s = 0; s < SHAPES; s++)
-            if (error[s] < error[cap->shape]) cap->shape = (uint8_t)s;
-        before = cap->shape;
+    }
+    for (uint32_t s = 0; s < SHAPES; s++)
+        if (error[s] < error[cap->shape]) cap->shape = (uint8_t)s;
+}
+
+/* Puts the vertices of a cap where its shape says. */
+static void apply_shape(const struct lathe_cap *cap, lathe_mesh *mesh, const int64_t *squares) {
+    for (uint32_t k = 0; k < cap->vertices; k++) {
+        int32_t *at = mesh->lattice[cap->first + k], slice = slice_of(at, cap->side) * LATHE_LATTICE_ONE;
+        int32_t rise = lathe__cap_rise(cap->shape, squares[k]);
+        at[2] = cap->side ? slice - rise : slice + rise;
     }
 }
 
-static lathe_status build_all_as(lathe_mesh *mesh, lathe_cap_list *out, lathe_structure_state *state, lathe_arena arena[2],
-                                 uint32_t shape) {
-    lathe_surface_counts counts;
-    uint32_t shown;
-    out->count = 0;
-    out->next = shape;
-    lathe_status status = lathe__state_mesh(mesh, arena, state, &counts, &shown);
-    return out->failed ? LATHE_ERR_MEMORY : status;
-}
-
-lathe_status lathe__choose_caps(lathe_cap_list *out, lathe_structure_state *state, lathe_arena arena[2],
+lathe_status lathe__choose_caps(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2],
                                 const lathe_encode_source *source) {
-    lathe_mesh steep = {0}, flat = {0};
+    lathe_cap_list *l = &out->caps;
+    uint32_t shown;
     state->level = (int32_t)state->plan.level_count - 1;
-    state->caps = &out->caps;
-    out->caps.shape = record;
-    lathe_status status = build_all_as(&steep, out, state, arena, STEEP);
-    if (!status) status = build_all_as(&flat, out, state, arena, FLAT);
-    if (!status) choose_shapes(out, &steep, &flat, source);
-    lathe_mesh_free(&steep);
-    lathe_mesh_free(&flat);
+    state->caps = &l->caps;
+    l->caps = (lathe_caps){record, record_chord};
+    lathe_status status = lathe__state_mesh(&out->last, arena, state, &out->last_counts, &shown);
+    if (!status && l->failed) status = LATHE_ERR_MEMORY;
+    const int64_t *squares = l->squares;
+    for (uint32_t i = 0, before = 0; !status && i < l->count; before = l->list[i].shape, squares += l->list[i].vertices, i++) {
+        choose_shape(&l->list[i], &out->last, squares, before, source);
+        apply_shape(&l->list[i], &out->last, squares);
+    }
     state->caps = NULL;
-    out->caps.shape = replay;
+    l->caps = (lathe_caps){replay, NULL};
     return status;
 }
 

@@ -9,9 +9,10 @@ void lathe__baked_free(lathe_baked_structure *baked) {
         baked->finer[i] = NULL;
     }
     lathe__cap_list_free(&baked->caps);
+    lathe_mesh_free(&baked->last);
 }
 
-lathe_status lathe__encoded_mesh(lathe_mesh *out, lathe_arena arena[2], lathe_structure_state *state, const lathe_baked_structure *baked,
+lathe_status lathe__encoded_mesh(lathe_mesh *out, lathe_arena arena[2], lathe_structure_state *state, lathe_baked_structure *baked,
                                  uint32_t level, lathe_surface_counts *counts, uint32_t *shown) {
     lathe_cap_list replay = baked->caps;
     replay.next = 0;
@@ -23,7 +24,14 @@ lathe_status lathe__encoded_mesh(lathe_mesh *out, lathe_arena arena[2], lathe_st
         lathe__pyramid_strides(state->stride, state->pyramid, level, level ? lathe__pyramid_passes(state->pyramid, level) : 0);
         if (level + 1 < state->pyramid->level_count) status = lathe__pyramid_sample(&state->lattice, &state->mask, state->stride);
     }
-    if (!status) status = lathe__state_mesh(out, arena, state, counts, shown);
+    if (baked->last.vertex_count && level + 1 == baked->level_count) {
+        *out = baked->last;
+        *counts = baked->last_counts;
+        *shown = (uint32_t)state->plan.slices;
+        baked->last = (lathe_mesh){0};
+    } else if (!status) {
+        status = lathe__state_mesh(out, arena, state, counts, shown);
+    }
     lathe__mask_free(&state->lattice);
     state->finer = NULL;
     state->caps = NULL;
@@ -161,7 +169,7 @@ lathe_status lathe__structure_encode_level(lathe_baked_structure *out, lathe_str
     if (!status) status = level < lathe__first_exact(state) ? encode_stars(&e, state, models) : encode_slices(out, state, arena, &e, level);
     if (level) lathe__mask_free(&state->estimate);
     if (!status && level + 1 == out->level_count && state->flags & LATHE_FLAG_CAPS) {
-        status = lathe__choose_caps(&out->caps, state, arena, source);
+        status = lathe__choose_caps(out, state, arena, source);
         if (!status) lathe__encode_caps(&e, &out->caps);
     }
     lathe_status appended = lathe__append_coded(&out->packets[level], &e);

@@ -18,6 +18,8 @@ typedef struct lathe_cap_list {
     lathe_caps caps;
     struct lathe_cap { uint32_t first, vertices; uint8_t side, shape; } *list;   /* first: vertex of the mesh; owned */
     uint32_t count, capacity, next;
+    int64_t *squares;          /* of the chords, cap by cap; owned */
+    size_t square_count, square_capacity;
     bool failed;               /* memory is out */
 } lathe_cap_list;
 
@@ -27,6 +29,8 @@ typedef struct lathe_baked_structure {
     lathe_level_info levels[LATHE_MAX_LEVELS];
     uint8_t *finer[LATHE_MAX_LEVELS]; /* of each level, if the topology is kept; owned */
     lathe_cap_list caps;
+    lathe_mesh last;           /* of the last level, if it was built for its caps, until it is asked for; owned */
+    lathe_surface_counts last_counts;
     const lathe_radii *truth;  /* of radius maps */
     double area_mm2;           /* of the reference surface; 0 when nothing was measured */
 } lathe_baked_structure;
@@ -55,7 +59,7 @@ void lathe__pyramid_plan(lathe_header *header, const double spacing[3], const in
 /* Bytes of all passes of a mask as a model of its own. */
 lathe_status lathe__pyramid_cost(size_t *bytes, const lathe_mask *mask, const double spacing[3]);
 /* The mesh of a level, from the encoder's state. */
-lathe_status lathe__encoded_mesh(lathe_mesh *out, lathe_arena arena[2], lathe_structure_state *state, const lathe_baked_structure *baked,
+lathe_status lathe__encoded_mesh(lathe_mesh *out, lathe_arena arena[2], lathe_structure_state *state, lathe_baked_structure *baked,
                                  uint32_t level, lathe_surface_counts *counts, uint32_t *shown);
 
 /* ---- structure_plan.c: which slices begin early ---- */
@@ -83,8 +87,8 @@ lathe_status lathe__mesh_keeps(bool *out, const lathe_mesh *mesh, const lathe_to
 
 /* ---- structure_caps.c: where the grey values say ---- */
 
-/* Fills the list and the shapes. */
-lathe_status lathe__choose_caps(lathe_cap_list *out, lathe_structure_state *state, lathe_arena arena[2],
+/* Fills the list and the shapes, and out->last. */
+lathe_status lathe__choose_caps(lathe_baked_structure *out, lathe_structure_state *state, lathe_arena arena[2],
                                 const lathe_encode_source *source);
 void lathe__encode_caps(lathe_range_encoder *e, const lathe_cap_list *list);
 void lathe__cap_list_free(lathe_cap_list *list);

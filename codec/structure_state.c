@@ -195,7 +195,7 @@ lathe_status lathe__state_mesh(lathe_mesh *out, lathe_arena arena[2], const lath
     lathe_arena list = {0};
     lathe_status status = lathe__state_slices(&slices, shown, &list, state);
     if (!status) {
-        cap_reader reader = {.caps = {read_shape}, .code = state->cap_code};
+        cap_reader reader = {.caps = {read_shape, NULL}, .code = state->cap_code};
         lathe__number_start(reader.models, LATHE_CAP_MODELS, LATHE_NUMBER_START);
         bool last = (uint32_t)state->level + 1 == state->plan.level_count;
         lathe_caps *caps = state->cap_bytes ? &reader.caps : state->caps;

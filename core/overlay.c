@@ -754,9 +754,9 @@ static uint32_t next_node(const overlay *o) { return o->vertices + o->builder->m
 static int32_t height_over(const overlay *o, uint32_t sides, uint32_t shape, uint32_t a, uint32_t b) {
     int32_t rise = o->slab->cap;
     if (o->slab->caps) {
-        int64_t x = o->at[a].x - o->at[b].x, y = o->at[a].y - o->at[b].y, bow = (x * x + y * y) >> (LATHE_LATTICE_BITS - 7 + 2 * shape);
-        if (shape < 4) bow = (int64_t)(2 * shape + 1) * (LATHE_LATTICE_ONE / 8);
-        rise = bow < LATHE_RISE_MIN ? LATHE_RISE_MIN : bow > LATHE_RISE_MAX ? LATHE_RISE_MAX : (int32_t)bow;
+        int64_t x = o->at[a].x - o->at[b].x, y = o->at[a].y - o->at[b].y;
+        rise = lathe__cap_rise(shape, x * x + y * y);
+        if (COUNTED && sides < 3 && o->slab->caps->chord) o->slab->caps->chord(o->slab->caps, x * x + y * y);
     }
     return sides == 1 ? o->slab->height[0] + rise : sides == 2 ? o->slab->height[1] - rise : mid_height(o);
 }

@@ -26,7 +26,15 @@ typedef struct lathe_caps {
      * upper one. 0 .. 3: all by (2 * shape + 1) / 8 of a slice distance; 4 .. 7: the middle of a chord of c pixels by
      * c * c / 2^(2 * shape - 7), as on a paraboloid. */
     uint32_t (*shape)(struct lathe_caps *caps, const lathe_mesh *mesh, uint32_t vertices, uint32_t side);
+    /* NULL, or told of the chord below each of these vertices, in order: its length squared. Not by a small decoder. */
+    void (*chord)(struct lathe_caps *caps, int64_t square);
 } lathe_caps;
+/* How far a vertex over such a chord rises, lattice units. */
+static inline int32_t lathe__cap_rise(uint32_t shape, int64_t square) {
+    int64_t bow = square >> (LATHE_LATTICE_BITS - 7 + 2 * shape);
+    if (shape < 4) bow = (int64_t)(2 * shape + 1) * (LATHE_LATTICE_ONE / 8);
+    return bow < LATHE_RISE_MIN ? LATHE_RISE_MIN : bow > LATHE_RISE_MAX ? LATHE_RISE_MAX : (int32_t)bow;
+}
 
 typedef struct lathe_slab {
     const lathe_outline *outline[2];   /* lower, upper; an outline without points is air */

@@ -230,7 +230,7 @@ static void compare_with_state(const phantom *p, const lathe_model *model, const
         state.plan = (lathe_level_plan){state.mask.size[2], pyramid.level_count, NULL};
         baked.level_count = pyramid.level_count;
         for (int k = 0; k < 3; k++) state.stride[k] = 1;
-        if (state.flags & LATHE_FLAG_CAPS) CHECK_EQ(lathe__choose_caps(&baked.caps, &state, arena, &source), LATHE_OK);
+        if (state.flags & LATHE_FLAG_CAPS) CHECK_EQ(lathe__choose_caps(&baked, &state, arena, &source), LATHE_OK);
     } else {
         CHECK(lathe__structure_plan(&baked, &state, arena, &source) == LATHE_OK);
         CHECK(lathe__choose_radii(&baked, &state, arena, volume, p->axis, header.boundary, &source) == LATHE_OK);
