@@ -321,7 +321,7 @@ static lathe_status take_rings(lathe_draco_shape *shape, lathe_radii *radii, con
     return LATHE_OK;
 }
 
-/* What a lattice without a sample inside shows: an octahedron, with one slice in the middle of its box, which has no other there. */
+/* What a raster without a sample inside shows: an octahedron, with one slice in the middle of its box, which has no other there. */
 static bool is_octahedron(const lathe_structure_state *state, const lathe_mesh *mesh) {
     int32_t middle = (state->mask.size[2] - 1) * (LATHE_LATTICE_ONE / 2);
     if (!state->pyramid || mesh->vertex_count != 6 || mesh->triangle_count != 8) return false;

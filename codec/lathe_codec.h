@@ -75,7 +75,7 @@ typedef struct lathe_model_info {
     bool keep_topology;            /* every level has the topology of the last */
     bool caps;                     /* caps of the last level have coded shapes */
     bool exact;                    /* no structure is a radius map */
-    bool independent, pyramid;     /* each structure can be decoded alone; levels are lattices, not slices */
+    bool independent, pyramid;     /* each structure can be decoded alone; levels are rasters, not slices */
     /* Of the whole model at each level: area-weighted RMS, largest max (negative: not measured), and totals. */
     const lathe_level_info *levels;
 } lathe_model_info;
@@ -129,7 +129,7 @@ typedef struct lathe_bake_options {
     bool keep_topology;            /* every level gets the topology of the last, at the price of more bytes at first */
     bool exact;                    /* never a radius map (within 0.215 voxel, for fewer bytes) */
     bool independent;              /* each structure can be decoded alone, for about an eighth more bytes */
-    bool slices;                   /* levels of whole slices, as with keep_topology, instead of lattices: archives of before */
+    bool slices;                   /* levels of whole slices, as with keep_topology, instead of rasters: archives of before */
     uint32_t levels;               /* at most so many; 0: by the size. Not for a kept topology or a radius map */
     bool flat_caps;                /* caps rise half a voxel instead of following the grey values */
     bool measure;                  /* errors in mm (mesh against isosurface) */

@@ -34,7 +34,7 @@ void lathe__pyramid_strides(int32_t stride[3], const lathe_pyramid *pyramid, uin
             stride[lathe__pyramid_axis(pyramid, l, pass)] /= 2;
 }
 
-/* ---- lattices ---- */
+/* ---- rasters ---- */
 
 void lathe__pyramid_size(int32_t out[3], const int32_t box[3], const int32_t stride[3]) {
     for (int k = 0; k < 2; k++) out[k] = (box[k] - 2 + stride[k]) / stride[k] + 1;
@@ -79,45 +79,45 @@ static void transpose(uint64_t m[64]) {
 }
 
 /* Columns of one slice as rows of planes, or back: blocks of 64 x 64 bits. */
-static void turn_slice(const lathe_mask *lattice, const lathe_mask *planes, int32_t w, bool back) {
-    for (int32_t bv = 0; bv < lattice->size[1]; bv += 64)
-        for (int32_t bu = 0; bu < lattice->size[0]; bu += 64) {
+static void turn_slice(const lathe_mask *raster, const lathe_mask *planes, int32_t w, bool back) {
+    for (int32_t bv = 0; bv < raster->size[1]; bv += 64)
+        for (int32_t bu = 0; bu < raster->size[0]; bu += 64) {
             uint64_t m[64] = {0};
-            int32_t nv = lattice->size[1] - bv < 64 ? lattice->size[1] - bv : 64, nu = lattice->size[0] - bu < 64 ? lattice->size[0] - bu : 64;
+            int32_t nv = raster->size[1] - bv < 64 ? raster->size[1] - bv : 64, nu = raster->size[0] - bu < 64 ? raster->size[0] - bu : 64;
             if (back) {
                 for (int32_t k = 0; k < nu; k++) m[k] = row_of(planes, w + 1, bu + k)[bv >> 6];
                 transpose(m);
-                for (int32_t k = 0; k < nv; k++) row_of(lattice, bv + k, w)[bu >> 6] = m[k];
+                for (int32_t k = 0; k < nv; k++) row_of(raster, bv + k, w)[bu >> 6] = m[k];
             } else {
-                for (int32_t k = 0; k < nv; k++) m[k] = row_of(lattice, bv + k, w)[bu >> 6];
+                for (int32_t k = 0; k < nv; k++) m[k] = row_of(raster, bv + k, w)[bu >> 6];
                 transpose(m);
                 for (int32_t k = 0; k < nu; k++) row_of(planes, w + 1, bu + k)[bv >> 6] = m[k];
             }
         }
 }
 
-static void turn_rows(const lathe_mask *lattice, const lathe_mask *planes, int32_t w, bool back) {
-    for (int32_t v = 0; v < lattice->size[1]; v++) {
-        uint64_t *row = row_of(lattice, v, w), *plane = row_of(planes, w + 1, v);
-        memcpy(back ? row : plane, back ? plane : row, (size_t)lattice->row_words * sizeof *row);
+static void turn_rows(const lathe_mask *raster, const lathe_mask *planes, int32_t w, bool back) {
+    for (int32_t v = 0; v < raster->size[1]; v++) {
+        uint64_t *row = row_of(raster, v, w), *plane = row_of(planes, w + 1, v);
+        memcpy(back ? row : plane, back ? plane : row, (size_t)raster->row_words * sizeof *row);
     }
 }
 
-static void turn(const lathe_mask *lattice, const lathe_mask *planes, int axis, bool back) {
-    for (int32_t w = 0; w < lattice->size[2]; w++) {
-        if (axis) turn_rows(lattice, planes, w, back);
-        else turn_slice(lattice, planes, w, back);
+static void turn(const lathe_mask *raster, const lathe_mask *planes, int axis, bool back) {
+    for (int32_t w = 0; w < raster->size[2]; w++) {
+        if (axis) turn_rows(raster, planes, w, back);
+        else turn_slice(raster, planes, w, back);
     }
 }
 
-lathe_status lathe__pyramid_turn(lathe_mask *out, const lathe_mask *lattice, int axis) {
-    int32_t size[3] = {lattice->size[axis ? 0 : 1], lattice->size[2] + 2, lattice->size[axis]};
-    lathe_status status = lathe__mask_new(out, size, lattice->origin);
-    if (!status) turn(lattice, out, axis, false);
+lathe_status lathe__pyramid_turn(lathe_mask *out, const lathe_mask *raster, int axis) {
+    int32_t size[3] = {raster->size[axis ? 0 : 1], raster->size[2] + 2, raster->size[axis]};
+    lathe_status status = lathe__mask_new(out, size, raster->origin);
+    if (!status) turn(raster, out, axis, false);
     return status;
 }
 
-void lathe__pyramid_turn_back(const lathe_mask *lattice, const lathe_mask *planes, int axis) { turn(lattice, planes, axis, true); }
+void lathe__pyramid_turn_back(const lathe_mask *raster, const lathe_mask *planes, int axis) { turn(raster, planes, axis, true); }
 
 /* ---- planes ---- */
 
@@ -161,15 +161,15 @@ static lathe_status octahedron(lathe_mesh *out, const int32_t box[3]) {
     return LATHE_OK;
 }
 
-lathe_status lathe__pyramid_mesh(lathe_mesh *out, lathe_arena arena[2], const lathe_mask *lattice, const int32_t stride[3],
+lathe_status lathe__pyramid_mesh(lathe_mesh *out, lathe_arena arena[2], const lathe_mask *raster, const int32_t stride[3],
                                  const int32_t box[3], const lathe_surface_style *style, lathe_surface_counts *counts) {
-    if (is_empty(lattice)) return octahedron(out, box);
+    if (is_empty(raster)) return octahedron(out, box);
     lathe_arena list = {0};
-    uint32_t count = (uint32_t)lattice->size[2];
+    uint32_t count = (uint32_t)raster->size[2];
     int32_t *slices = LATHE_NEW(&list, int32_t, count);
     lathe_status status = slices ? LATHE_OK : LATHE_ERR_MEMORY;
     for (uint32_t i = 0; !status && i < count; i++) slices[i] = (int32_t)i;
-    if (!status) status = lathe__build_styled(out, arena, lattice, slices, count, style, counts);
+    if (!status) status = lathe__build_styled(out, arena, raster, slices, count, style, counts);
     lathe__arena_free(&list);
     for (uint32_t i = 0; !status && i < out->vertex_count; i++)
         for (int k = 0; k < 3; k++) out->lattice[i][k] *= stride[k];

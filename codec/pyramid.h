@@ -1,12 +1,12 @@
-/* Levels of slices as a pyramid: a level knows the voxels on a lattice whose strides are powers of two, one for each axis, and each
- * pass halves one stride. The surface of a level is that of its lattice, a small mask. Decoder-safe. */
+/* Levels of slices as a pyramid: a level knows the voxels on a raster whose strides are powers of two, one for each axis, and each
+ * pass halves one stride. The surface of a level is that of its raster, a small mask. Decoder-safe. */
 #ifndef LATHE_PYRAMID_H
 #define LATHE_PYRAMID_H
 #include "archive_format.h"
 #include "level.h"
 #include "occupancy.h"
 
-/* Which axis each pass halves; from header parameters 2 .. (lathe__pyramid_read). Level 0 is the first lattice, one pass of its own. */
+/* Which axis each pass halves; from header parameters 2 .. (lathe__pyramid_read). Level 0 is the first raster, one pass of its own. */
 typedef struct lathe_pyramid {
     uint32_t level_count;
     uint32_t passes[LATHE_MAX_LEVELS];  /* of levels 1 ..: two bits a pass, axis + 1, lowest first */
@@ -26,25 +26,25 @@ static inline int lathe__pyramid_axis(const lathe_pyramid *pyramid, uint32_t lev
 /* Strides behind the first `passes` passes of a level. */
 void lathe__pyramid_strides(int32_t stride[3], const lathe_pyramid *pyramid, uint32_t level, uint32_t passes);
 
-/* Samples of a box along each axis: numbers k * stride; in u and v up to one beyond the last pixel inside, so that a lattice has the
+/* Samples of a box along each axis: numbers k * stride; in u and v up to one beyond the last pixel inside, so that a raster has the
  * margin that masks have. */
 void lathe__pyramid_size(int32_t out[3], const int32_t box[3], const int32_t stride[3]);
-/* The lattice's mask of a whole one. */
+/* The raster's mask of a whole one. */
 lathe_status lathe__pyramid_sample(lathe_mask *out, const lathe_mask *whole, const int32_t stride[3]);
-/* The lattice of half the stride along an axis, with the old samples at even numbers and nothing yet at odd ones. size: of the new one. */
+/* The raster of half the stride along an axis, with the old samples at even numbers and nothing yet at odd ones. size: of the new one. */
 lathe_status lathe__pyramid_spread(lathe_mask *out, const lathe_mask *coarse, const int32_t size[3], int axis);
 /* Planes across axis 0 or 1 as slices: (v, w) for each u, or (u, w) for each v, with a margin of one row below and above in w. */
-lathe_status lathe__pyramid_turn(lathe_mask *out, const lathe_mask *lattice, int axis);
-/* And back, into a lattice of the right size. */
-void lathe__pyramid_turn_back(const lathe_mask *lattice, const lathe_mask *planes, int axis);
+lathe_status lathe__pyramid_turn(lathe_mask *out, const lathe_mask *raster, int axis);
+/* And back, into a raster of the right size. */
+void lathe__pyramid_turn_back(const lathe_mask *raster, const lathe_mask *planes, int axis);
 
-/* What is known around plane c of `planes`, the next one being coded; axis: the one halved, -1 for the first lattice. */
+/* What is known around plane c of `planes`, the next one being coded; axis: the one halved, -1 for the first raster. */
 lathe_known lathe__pyramid_known(const lathe_mask *planes, int32_t c, int axis);
 /* The planes that a pass codes: first, first + step, ... below end. */
 typedef struct lathe_plane_range { int32_t first, step, end; } lathe_plane_range;
 lathe_plane_range lathe__pyramid_planes(const lathe_mask *planes, int axis);
 
-/* The surface of a lattice in the frame of its box; of an empty one, the octahedron of the box. */
-lathe_status lathe__pyramid_mesh(lathe_mesh *out, lathe_arena arena[2], const lathe_mask *lattice, const int32_t stride[3],
+/* The surface of a raster in the frame of its box; of an empty one, the octahedron of the box. */
+lathe_status lathe__pyramid_mesh(lathe_mesh *out, lathe_arena arena[2], const lathe_mask *raster, const int32_t stride[3],
                                  const int32_t box[3], const lathe_surface_style *style, lathe_surface_counts *counts);
 #endif

@@ -11,16 +11,16 @@ static lathe_status decode_planes(lathe_structure_state *state, lathe_range_deco
     return status;
 }
 
-/* Halves the stride of an axis: `fine` becomes the state's lattice, also on failure. */
+/* Halves the stride of an axis: `fine` becomes the state's raster, also on failure. */
 static lathe_status decode_axis(lathe_structure_state *state, lathe_range_decoder *d, int axis) {
     int32_t size[3];
     lathe_mask fine, planes;
     state->stride[axis] /= 2;
     lathe__pyramid_size(size, state->mask.size, state->stride);
-    lathe_status status = lathe__pyramid_spread(&fine, &state->lattice, size, axis);
+    lathe_status status = lathe__pyramid_spread(&fine, &state->raster, size, axis);
     if (status) return status;
-    lathe__mask_free(&state->lattice);
-    state->lattice = fine;
+    lathe__mask_free(&state->raster);
+    state->raster = fine;
     if (axis == 2) return decode_planes(state, d, &fine, axis);
     status = lathe__pyramid_turn(&planes, &fine, axis);
     if (status) return status;
@@ -34,9 +34,9 @@ static lathe_status decode_first(lathe_structure_state *state, lathe_range_decod
     int32_t size[3];
     lathe__pyramid_strides(state->stride, state->pyramid, 0, 0);
     lathe__pyramid_size(size, state->mask.size, state->stride);
-    lathe_status status = lathe__mask_new(&state->lattice, size, state->mask.origin);
+    lathe_status status = lathe__mask_new(&state->raster, size, state->mask.origin);
     if (!status) status = lathe__state_start_occupancy(state, models);
-    return status ? status : decode_planes(state, d, &state->lattice, -1);
+    return status ? status : decode_planes(state, d, &state->raster, -1);
 }
 
 lathe_status lathe__pass_decode(lathe_structure_state *state, lathe_range_decoder *d, lathe_models *models, uint32_t level,
@@ -51,7 +51,7 @@ lathe_status lathe__pass_decode(lathe_structure_state *state, lathe_range_decode
     state->level = (int32_t)level;
     if (level + 1 < pyramid->level_count) return LATHE_OK;
     lathe__state_drop_occupancy(state);
-    state->mask.bits = state->lattice.bits;   /* of one size: the last strides are 1 */
-    state->lattice.bits = NULL;
+    state->mask.bits = state->raster.bits;   /* of one size: the last strides are 1 */
+    state->raster.bits = NULL;
     return state->flags & LATHE_FLAG_CAPS && !(state->flags & LATHE_FLAG_SHARED) ? lathe__keep_caps(state, d) : LATHE_OK;
 }

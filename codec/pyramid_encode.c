@@ -50,26 +50,26 @@ static lathe_status encode_planes(lathe_structure_state *state, lathe_range_enco
 
 lathe_status lathe__pass_encode(lathe_range_encoder *e, lathe_structure_state *state, lathe_models *models, uint32_t level, uint32_t pass) {
     int32_t stride[3];
-    lathe_mask lattice, planes;
+    lathe_mask raster, planes;
     int axis = level ? lathe__pyramid_axis(state->pyramid, level, pass) : -1;
     lathe__pyramid_strides(stride, state->pyramid, level, pass + 1);
     lathe_status status = level ? LATHE_OK : lathe__state_start_occupancy(state, models);
-    if (!status) status = lathe__pyramid_sample(&lattice, &state->mask, stride);
+    if (!status) status = lathe__pyramid_sample(&raster, &state->mask, stride);
     if (status) return status;
     if (axis == 0 || axis == 1) {
-        status = lathe__pyramid_turn(&planes, &lattice, axis);
-        lathe__mask_free(&lattice);
+        status = lathe__pyramid_turn(&planes, &raster, axis);
+        lathe__mask_free(&raster);
         if (status) return status;
-        lattice = planes;
+        raster = planes;
     }
-    status = encode_planes(state, e, &lattice, axis);
-    lathe__mask_free(&lattice);
+    status = encode_planes(state, e, &raster, axis);
+    lathe__mask_free(&raster);
     return status;
 }
 
 /* ---- schedule ---- */
 
-/* Octaves: so many that the first lattice has about as many samples along an axis as there are voxels between two of them. */
+/* Octaves: so many that the first raster has about as many samples along an axis as there are voxels between two of them. */
 static uint32_t octaves(const double voxels[3]) {
     double product = voxels[0] * voxels[1] * voxels[2];
     uint32_t n = 1;

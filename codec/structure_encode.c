@@ -22,7 +22,7 @@ lathe_status lathe__encoded_mesh(lathe_mesh *out, lathe_arena arena[2], lathe_st
     lathe_status status = LATHE_OK;
     if (state->pyramid) {
         lathe__pyramid_strides(state->stride, state->pyramid, level, level ? lathe__pyramid_passes(state->pyramid, level) : 0);
-        if (level + 1 < state->pyramid->level_count) status = lathe__pyramid_sample(&state->lattice, &state->mask, state->stride);
+        if (level + 1 < state->pyramid->level_count) status = lathe__pyramid_sample(&state->raster, &state->mask, state->stride);
     }
     if (baked->last.vertex_count && level + 1 == baked->level_count) {
         *out = baked->last;
@@ -32,7 +32,7 @@ lathe_status lathe__encoded_mesh(lathe_mesh *out, lathe_arena arena[2], lathe_st
     } else if (!status) {
         status = lathe__state_mesh(out, arena, state, counts, shown);
     }
-    lathe__mask_free(&state->lattice);
+    lathe__mask_free(&state->raster);
     state->finer = NULL;
     state->caps = NULL;
     return status;

@@ -102,8 +102,8 @@ lathe_status lathe__count_waiting(lathe_level_info *levels, const lathe_structur
 
 /* ---- the same of a pyramid ---- */
 
-/* A bit for each level whose lattice has a pixel of the run. */
-static uint32_t on_lattices(const void *context, int32_t first, int32_t last, int32_t v, int32_t w) {
+/* A bit for each level whose raster has a pixel of the run. */
+static uint32_t on_rasters(const void *context, int32_t first, int32_t last, int32_t v, int32_t w) {
     const lathe_pyramid *pyramid = context;
     uint32_t found = 0;
     for (uint32_t level = 0; level < pyramid->level_count; level++) {
@@ -117,7 +117,7 @@ static uint32_t on_lattices(const void *context, int32_t first, int32_t last, in
 
 lathe_status lathe__pyramid_waiting(lathe_level_info *levels, const lathe_structure_state *state) {
     const lathe_pyramid *pyramid = state->pyramid;
-    lathe_probe probe = {on_lattices, pyramid, (1u << pyramid->level_count) - 1};
+    lathe_probe probe = {on_rasters, pyramid, (1u << pyramid->level_count) - 1};
     lathe_component *components;
     size_t count;
     lathe_status status = lathe__find_components(&components, &count, &state->mask, &probe);

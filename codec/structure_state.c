@@ -4,7 +4,7 @@
 void lathe__state_free(lathe_structure_state *state) {
     lathe__mask_free(&state->mask);
     lathe__mask_free(&state->estimate);
-    lathe__mask_free(&state->lattice);
+    lathe__mask_free(&state->raster);
     free((void *)(uintptr_t)state->plan.early);
     free(state->finer);
     state->plan.early = NULL;
@@ -178,12 +178,12 @@ lathe_status lathe__state_slices(int32_t **out, uint32_t *count, lathe_arena *ar
 }
 
 /* Vertices lie where the grey values cross on average; where strides are larger than a voxel, that is the middle. */
-static lathe_status lattice_mesh(lathe_mesh *out, lathe_arena arena[2], const lathe_structure_state *state, lathe_caps *caps,
+static lathe_status raster_mesh(lathe_mesh *out, lathe_arena arena[2], const lathe_structure_state *state, lathe_caps *caps,
                                  lathe_surface_counts *counts) {
-    const lathe_mask *lattice = state->lattice.bits ? &state->lattice : &state->mask;
-    bool whole = lattice == &state->mask;
+    const lathe_mask *raster = state->raster.bits ? &state->raster : &state->mask;
+    bool whole = raster == &state->mask;
     lathe_surface_style style = {.fraction = whole ? state->fraction : LATHE_FRACTION_ONE / 2, .caps = whole ? caps : NULL};
-    return lathe__pyramid_mesh(out, arena, lattice, state->stride, state->mask.size, &style, counts);
+    return lathe__pyramid_mesh(out, arena, raster, state->stride, state->mask.size, &style, counts);
 }
 
 lathe_status lathe__state_mesh(lathe_mesh *out, lathe_arena arena[2], const lathe_structure_state *state,
@@ -201,7 +201,7 @@ lathe_status lathe__state_mesh(lathe_mesh *out, lathe_arena arena[2], const lath
         lathe_caps *caps = state->cap_bytes ? &reader.caps : state->caps;
         lathe_surface_style style = {.fraction = state->fraction, .coarseness = state->plan.level_count - 1 - (uint32_t)state->level,
                                      .finer = state->finer, .caps = last ? caps : NULL};
-        if (state->pyramid) status = lattice_mesh(out, arena, state, caps, counts);
+        if (state->pyramid) status = raster_mesh(out, arena, state, caps, counts);
         else if (!state->level && !state->exact_base) status = base_mesh(out, arena, state, slices, *shown, counts);
         else status = lathe__build_styled(out, arena, &state->mask, slices, *shown, &style, counts);
     }

@@ -30,9 +30,9 @@ typedef struct lathe_structure_state {
     lathe_star_slice *base;    /* one for each slice of level 0 */
     lathe_occupancy *occupancy; /* owned, unless SHARED */
     lathe_mask estimate;       /* the base shape's slices as pixels, while level 1 is coded */
-    const lathe_pyramid *pyramid; /* levels are lattices: `mask` has bits when the last one is whole. NULL: levels of slices */
-    lathe_mask lattice;        /* what is known, unless it is all */
-    int32_t stride[3];         /* of the lattice */
+    const lathe_pyramid *pyramid; /* levels are rasters: `mask` has bits when the last one is whole. NULL: levels of slices */
+    lathe_mask raster;        /* what is known, unless it is all */
+    int32_t stride[3];         /* of the raster */
     uint32_t pass;             /* passes known of level + 1 */
     lathe_radii *radii;        /* in the arena: the structure is made of radius maps, and has neither mask nor base */
     lathe_range_decoder cap_code; /* the last packet from its caps on */
@@ -41,7 +41,7 @@ typedef struct lathe_structure_state {
 } lathe_structure_state;
 
 /* Is there anything to show? */
-static inline bool lathe__state_known(const lathe_structure_state *state) { return state->level >= 0 || state->lattice.bits; }
+static inline bool lathe__state_known(const lathe_structure_state *state) { return state->level >= 0 || state->raster.bits; }
 void lathe__state_free(lathe_structure_state *state);
 
 /* The first level whose packet has slices. */

@@ -167,7 +167,7 @@ static void add_radii(digest *d, const lathe_structure_state *s) {
 }
 
 static void add_raster(digest *d, const lathe_structure_state *s) {
-    const lathe_mask *raster = s->lattice.bits ? &s->lattice : &s->mask;
+    const lathe_mask *raster = s->raster.bits ? &s->raster : &s->mask;
     size_t words = lathe__mask_slice_words(raster) * (size_t)raster->size[2];
     for (int k = 0; k < 3; k++) add(d, (uint32_t)s->stride[k]);
     for (int k = 0; k < 3; k++) add(d, (uint32_t)raster->size[k]);
