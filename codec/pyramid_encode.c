@@ -14,12 +14,14 @@ static uint64_t squeeze_bits(uint64_t x) {
 
 /* Every stride-th pixel of a row; row has room for the whole one. */
 static void sample_row(uint64_t *row, const uint64_t *from, int32_t words, int32_t stride) {
+    int32_t all = words;
     memcpy(row, from, (size_t)words * sizeof *row);
     for (; stride > 1; stride /= 2) {
         for (int32_t i = 0; i < words; i += 2)
             row[i / 2] = squeeze_bits(row[i]) | (i + 1 < words ? squeeze_bits(row[i + 1]) << 32 : 0);
         words = (words + 1) / 2;
     }
+    memset(row + words, 0, (size_t)(all - words) * sizeof *row);
 }
 
 lathe_status lathe__pyramid_sample(lathe_mask *out, const lathe_mask *whole, const int32_t stride[3]) {

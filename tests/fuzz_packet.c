@@ -1,6 +1,6 @@
 /* libFuzzer target: the packets of one structure of 20 x 20 x 6 voxels, without a container around them. The first two bytes say
- * where the input is cut into the packets of levels 0, 1 and 2, the third one is the header's flags (caps, topology kept); after each
- * packet, the mesh that a viewer would show is built. */
+ * where the input is cut into the packets of levels 0, 1 and 2, the third one is the header's flags (caps, topology kept, a pyramid
+ * with two passes a level); after each packet, the mesh that a viewer would show is built. */
 #include <stdlib.h>
 #include "structure_state.h"
 
@@ -8,6 +8,17 @@ static void check_mesh(const lathe_mesh *mesh) {
     for (uint32_t i = 0; i < mesh->triangle_count; i++)
         for (int k = 0; k < 3; k++)
             if (mesh->triangles[i][k] >= mesh->vertex_count) abort();
+}
+
+/* The passes of a level, one behind the other in one range coder. */
+static lathe_status decode_passes(lathe_structure_state *state, lathe_models *models, uint32_t level, const uint8_t *bytes, size_t size,
+                                  const char **fault) {
+    lathe_range_decoder d;
+    lathe_status status = LATHE_OK;
+    lathe__decoder_start(&d, bytes, size);
+    for (uint32_t pass = 0; !status && pass < lathe__pyramid_passes(state->pyramid, level); pass++)
+        status = lathe__pass_decode(state, &d, models, level, fault);
+    return status;
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size);
@@ -18,11 +29,18 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
     size_t begin[4] = {3, 3 + first, 3 + first + second, size};
     lathe_structure_state state = {.mask = {.size = {20, 20, 6}, .row_words = 1}, .fraction = 28, .flags = bytes[2], .level = -1};
     lathe_arena arena[2] = {{0}, {0}};
+    static const lathe_pyramid pyramid = {3, {0, 3 | 1 << 2, 2 | 1 << 2}, {4, 2, 2}};
+    if (bytes[2] & LATHE_FLAG_PYRAMID) {
+        state.pyramid = &pyramid;
+        state.flags &= ~(uint32_t)LATHE_FLAG_SHARED;
+    }
     state.plan = (lathe_level_plan){.slices = 6, .level_count = 3};
     for (uint32_t level = 0; level < 3; level++) {
         const char *fault = "";
-        lathe_status status = lathe__structure_decode(&state, &arena[0], &models, level, bytes + begin[level],
-                                                      begin[level + 1] - begin[level], &fault);
+        const uint8_t *packet = bytes + begin[level];
+        size_t packet_size = begin[level + 1] - begin[level];
+        lathe_status status = state.pyramid ? decode_passes(&state, &models, level, packet, packet_size, &fault)
+                                            : lathe__structure_decode(&state, &arena[0], &models, level, packet, packet_size, &fault);
         if (status > 0 || (status && !fault[0])) abort();
         if (status) break;
         lathe_mesh mesh = {0};
