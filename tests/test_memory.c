@@ -62,12 +62,17 @@ static void start_counting(void) {}
 
 /* ---- streams ---- */
 
-static void emit_header(lathe_bytes *out, lathe_header_structure *structures, uint32_t count, uint32_t flags) {
-    lathe_header header = {.axis = LATHE_AXIS_Z, .affine = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}, .parameter_count = 2,
-                           .parameters = {32, flags}, .structure_count = count, .structures = structures};
+/* passes: of a pyramid's second level; 0: no pyramid */
+static void emit_header_of(lathe_bytes *out, lathe_header_structure *structures, uint32_t count, uint32_t flags, uint32_t passes) {
+    lathe_header header = {.axis = LATHE_AXIS_Z, .affine = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}, .parameter_count = passes ? 3 : 2,
+                           .parameters = {32, flags, passes}, .structure_count = count, .structures = structures};
     const char *fault = "";
     if (lathe__header_check(&header, &fault)) abort();
     lathe__emit_header(out, &header, 0, count);
+}
+
+static void emit_header(lathe_bytes *out, lathe_header_structure *structures, uint32_t count, uint32_t flags) {
+    emit_header_of(out, structures, count, flags, 0);
 }
 
 static void emit_level(lathe_bytes *out, uint32_t level, const lathe_bytes *payload, uint32_t count) {
@@ -271,6 +276,22 @@ static void empty_slices(void) {
     lathe__bytes_free(&payload);
 }
 
+/* Three rows of pixels: the planes across u have a word for each of their rows, which have three samples. */
+static void padded_planes(void) {
+    lathe_header_structure one = box(1026, 3, 1024, 2);
+    lathe_bytes stream = {0}, payload = {0};
+    uint32_t steps;
+    emit_header_of(&stream, &one, 1, LATHE_FLAG_PYRAMID, 1);
+    emit_zeros(&payload, 4000);
+    emit_level(&stream, 0, &payload, 1);
+    emit_level(&stream, 1, &payload, 1);
+    size_t before = 9 * 8 * 3 * 1024, behind = 17 * 8 * 3 * 1024, planes = (size_t)8 * 1026 * 1026, models = 3 * ((512 << 10) + (32 << 10)) + (400 << 10);
+    check_bound("planes", peak_of(&stream, stream.size, &steps, false), before + behind + planes + models + waiting(stream.size), 0.6);
+    CHECK_EQ(steps, 2);
+    lathe__bytes_free(&stream);
+    lathe__bytes_free(&payload);
+}
+
 /* ---- whole files ---- */
 
 static int append(void *context, const void *bytes, size_t size) {
@@ -322,6 +343,7 @@ int main(void) {
     many_stars();
     largest_radius_map();
     empty_slices();
+    padded_planes();
     largest_archive();
     return check_end();
 }
