@@ -127,7 +127,7 @@ typedef struct lathe_bake_options {
     const lathe_bake_structure *structures; size_t structure_count;   /* labels to bake; none: the threshold */
     const char *name;              /* of the model */
     bool keep_topology;            /* every level gets the topology of the last, at the price of more bytes at first */
-    bool exact;                    /* never a radius map (within 0.215 voxel, for fewer bytes) */
+    bool exact;                    /* never a radius map (within 0.22 voxel RMS, for fewer bytes) */
     bool independent;              /* each structure can be decoded alone, for about an eighth more bytes */
     bool slices;                   /* levels of whole slices, as with keep_topology, instead of rasters: archives of before */
     uint32_t levels;               /* at most so many; 0: by the size. Not for a kept topology or a radius map */

@@ -284,7 +284,7 @@ const lathe_command lathe__command_bake = {
     "  --no-errors        do not measure the levels' errors (faster)\n"
     "  --no-draco         do not measure the levels' size in Draco (faster)\n"
     "  --exact            every voxel as it is; else a star-shaped structure may become a radius map, if that is\n"
-    "                     within 0.215 voxel RMS and 1 voxel anywhere for 3/4 of the bytes\n"
+    "                     within 0.22 voxel RMS and 1 voxel anywhere for 9/10 of the bytes\n"
     "  --independent      each structure can be decoded alone (range requests), for about an eighth more bytes\n"
     "  --quiet            no progress bar, no summary\n"
     "  --json             print what `lathe info --json` prints\n",
