@@ -141,7 +141,7 @@ static lathe_status slab_euler(int64_t *out, const lathe_outline outlines[2], la
     lathe_mesh_builder builder = {0};
     lathe_overlay_counts counts = {0};
     uint32_t points = outlines[0].point_count + outlines[1].point_count;
-    lathe_slab slab = {.outline = {&outlines[0], &outlines[1]}, .height = {0, LATHE_LATTICE_ONE}, .base = {0, outlines[0].point_count},
+    lathe_slab slab = {.outline = {&outlines[0], &outlines[1]}, .height = {0, LATHE_LATTICE_ONE}, .base = 0,
                        .cap = LATHE_LATTICE_ONE / 2};
     lathe_status status = lathe__builder_reserve(&builder, points, 0);
     builder.mesh.vertex_count = points;   /* their positions do not matter here */

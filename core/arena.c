@@ -26,6 +26,10 @@ void *lathe__arena_alloc(lathe_arena *arena, size_t count, size_t size) {
     return p;
 }
 
+void lathe__arena_shrink(lathe_arena *arena, void *newest, size_t bytes) {
+    arena->used = (size_t)((char *)newest - (char *)arena->block - HEADER) + ((bytes + ALIGN - 1) & ~(size_t)(ALIGN - 1));
+}
+
 void lathe__arena_reset(lathe_arena *arena) {
     if (!arena->block) return;
     /* Blocks grow, so the newest is the largest. */

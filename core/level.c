@@ -57,8 +57,8 @@ static lathe_status overlay_roomy(lathe_mesh_builder *builder, lathe_arena *scra
         memset(slab->crowded, 0, upper->point_count);
     }
     lathe_status status = lathe__overlay_slab(builder, scratch, slab, counts);
-    for (uint32_t i = 0; i < upper->point_count; i++) {
-        int32_t *v = builder->mesh.lattice[slab->base[1] + i];
+    for (uint32_t i = 0; tries && i < upper->point_count; i++) {
+        int32_t *v = builder->mesh.lattice[slab->base + slab->outline[0]->point_count + i];
         lathe_point *p = &upper->points[i];
         if (status != LATHE_ERR_RANGE) v[0] = p->x, v[1] = p->y;
         else if (slab->crowded[i]) *p = lathe__jitter((lathe_point){v[0], v[1]}, tries);
@@ -84,7 +84,7 @@ lathe_status lathe__stack_with_caps(lathe_mesh *out, lathe_arena *scratch, const
         lathe_slab slab = {.outline = {i ? &outlines[i - 1] : &air, i < count ? &outlines[i] : &air},
                            .height = {(i ? heights[i - 1] : heights[0] - 1) * LATHE_LATTICE_ONE,
                                       (i < count ? heights[i] : heights[count - 1] + 1) * LATHE_LATTICE_ONE},
-                           .base = {base, above}, .cap = LATHE_LATTICE_ONE / 2, .caps = caps, .lattice = lattice};
+                           .base = base, .cap = LATHE_LATTICE_ONE / 2, .caps = caps, .lattice = lattice};
         for (uint32_t tries = lattice ? 0 : TRIES; !status; tries--) {
             status = overlay_roomy(&builder, scratch, &slab, &counts->overlay, tries);
             lathe__arena_reset(scratch);
@@ -133,15 +133,14 @@ lathe_status lathe__level_outlines(lathe_outline **out, lathe_arena arena[2], co
                                  .width = mask->size[0], .height = mask->size[1], .row_words = mask->row_words,
                                  .parity = (int)(i & 1), .fraction = style->fraction};
         uint32_t coarseness = style->coarseness - (style->finer ? style->finer[i] : 0);
-        int32_t *border;
         lathe_status status;
         if (coarseness) {
             lathe_outline loops;
-            status = lathe__trace_outline(&loops, &border, scratch, &view);
+            status = lathe__trace_outline(&loops, NULL, scratch, &view);
             if (!status) status = lathe__refine_outline(&outlines[i], keep, &loops, coarseness, i);
             lathe__arena_reset(scratch);
         } else {
-            status = lathe__trace_outline(&outlines[i], &border, keep, &view);
+            status = lathe__trace_outline(&outlines[i], NULL, keep, &view);
         }
         if (status) return status;
         counts->contour_vertices += outlines[i].point_count;

@@ -28,7 +28,7 @@ static bool exchanged(const uint64_t *slice, const lathe_slice_view *view, int32
 static void add_point(tracer *t, int32_t x, int32_t y, int32_t border) {
     uint32_t i = t->out->point_count++;
     t->out->points[i] = (lathe_point){x, y};
-    t->border[i] = border;
+    if (t->border) t->border[i] = border;
 }
 
 static void add_border(tracer *t, int32_t u, int32_t v, int direction) {
@@ -104,16 +104,17 @@ size_t lathe__count_borders(const lathe_slice_view *view) {
 lathe_status lathe__trace_outline(lathe_outline *out, int32_t **border, lathe_arena *arena, const lathe_slice_view *view) {
     size_t words = (size_t)view->row_words, borders = lathe__count_borders(view);
     *out = (lathe_outline){0};
-    *border = NULL;
+    if (border) *border = NULL;
     if (borders == 0) return LATHE_OK;
     if (borders > UINT32_MAX / 4) return LATHE_ERR_LIMIT;
     tracer t = {.view = view, .out = out};
-    t.seen = LATHE_NEW(arena, uint64_t, words * (size_t)view->height);
-    /* Dents at most double the points; a loop has at least four border edges. */
-    out->points = LATHE_NEW(arena, lathe_point, borders * 2);
-    out->loops = LATHE_NEW(arena, lathe_loop, borders / 4 + 1);
-    t.border = *border = LATHE_NEW(arena, int32_t, borders * 2);
-    if (!t.seen || !out->points || !out->loops || !t.border) return LATHE_ERR_MEMORY;
+    if (border && !(t.border = *border = LATHE_NEW(arena, int32_t, borders * 2))) return LATHE_ERR_MEMORY;
+    /* Dents at most double the points; a loop has at least four border edges. What is not used is given back. */
+    size_t most_loops = borders / 4 + 1, room = borders * 2 * sizeof *out->points + most_loops * sizeof *out->loops;
+    out->points = lathe__arena_alloc(arena, 1, room + words * (size_t)view->height * sizeof *t.seen + sizeof *t.seen);
+    if (!out->points) return LATHE_ERR_MEMORY;
+    out->loops = (lathe_loop *)(out->points + borders * 2);
+    t.seen = (uint64_t *)((char *)out->points + (room + sizeof *t.seen - 1) / sizeof *t.seen * sizeof *t.seen);
     memset(t.seen, 0, words * (size_t)view->height * sizeof *t.seen);
     for (int32_t v = 0; v < view->height; v++) {
         const uint64_t *row = view->pixels + (size_t)v * words;
@@ -127,5 +128,7 @@ lathe_status lathe__trace_outline(lathe_outline *out, int32_t **border, lathe_ar
             }
         }
     }
+    out->loops = memmove(out->points + out->point_count, out->loops, out->loop_count * sizeof *out->loops);
+    lathe__arena_shrink(arena, out->points, out->point_count * sizeof *out->points + out->loop_count * sizeof *out->loops);
     return LATHE_OK;
 }

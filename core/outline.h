@@ -25,7 +25,7 @@ enum { LATHE_NO_BORDER = -1 };
  * overlap of their pixels:
  *  - where the neighbouring slice has inside and outside exchanged on a border edge, the vertex stays on its own side of the middle;
  *  - where two slices lack opposite corners of one pixel square, both get a dent: a vertex beyond the square's centre.
- * border: per point, pixel * 4 + direction (E N W S) of its border edge, or LATHE_NO_BORDER for a dent. Arena memory. */
+ * border: NULL, or gets per point pixel * 4 + direction (E N W S) of its border edge, or LATHE_NO_BORDER for a dent. Arena memory. */
 lathe_status lathe__trace_outline(lathe_outline *out, int32_t **border, lathe_arena *arena, const lathe_slice_view *view);
 
 /* Number of border edges of a slice, without tracing. */

@@ -18,7 +18,7 @@ enum { NONE = 0xffffffffu };
 enum { ROOM = 64, SPACING = 8 }; /* lattice units: what rounding cannot bridge */
 #ifdef LATHE_SMALL
 enum { COUNTED = 0 };          /* nobody asks a small decoder how its joints turned out */
-enum { CHAINED = 0 };          /* nor are lattice outlines worth a search of their own to it: 0.4 kB */
+enum { CHAINED = 1 };
 #else
 enum { COUNTED = 1 };
 enum { CHAINED = 1 };
@@ -27,6 +27,8 @@ enum { CHAINED = 1 };
 typedef struct cycle {
     uint32_t first, count;     /* its nodes */
     uint32_t meetings;
+    uint32_t loop;             /* one that it bounds a part of */
+    uint64_t area;             /* twice, modulo 2^64: exact as a signed number */
     uint32_t parent;           /* cell: the cycle that stands for it */
     uint32_t next_hole;        /* chain of the holes of an outer cycle */
     uint8_t of;                /* P: the side the cell lies inside of */
@@ -62,6 +64,7 @@ typedef struct overlay {
     lathe_tube *tubes;         /* block: matched loops, once asked for */
     uint8_t *matched;          /* block: 0 not tried, 1 there is a tube, 2 there is none */
     uint32_t extra;            /* mesh index of the first meeting */
+    uint32_t shift[2];         /* of vertices and of other nodes: mesh index less node, modulo 2^32 */
     bool harmed;               /* something is crowded */
 } overlay;
 
@@ -169,42 +172,34 @@ static lathe_range *list_ranges(const overlay *o, bool rows) {
     return ranges;
 }
 
-/* The pixel square that a lattice outline's edge lies in; without its far rims. */
-static lathe_range square_range(const overlay *o, uint32_t e) {
+/* The pixel square that a lattice outline's edge lies in. */
+static lathe_point square_of(const overlay *o, uint32_t e) {
     lathe_point p = o->at[e], q = o->at[o->next[e]];
-    lathe_range r = {imin(p.x, q.x), imin(p.y, q.y), imax(p.x, q.x), imax(p.y, q.y)};
-    r.x1 = imax(r.x1 - 1, r.x0);
-    r.y1 = imax(r.y1 - 1, r.y0);
-    return r;
+    return (lathe_point){imin(p.x, q.x) >> LATHE_LATTICE_BITS, imin(p.y, q.y) >> LATHE_LATTICE_BITS};
 }
 
-/* The same for lattice outlines: an edge has one cell only, so the lower outline's edges are chained square by square. */
+static uint32_t square_hash(lathe_point square, int bits) {
+    return ((uint32_t)square.x * 0x9E3779B1u + (uint32_t)square.y * 0x85EBCA77u) >> (32 - bits);
+}
+
+/* The same for lattice outlines: an edge lies in one square, so the lower outline's edges are chained by a hash of their squares. */
 static lathe_status find_lattice_meetings(overlay *o) {
     if (!o->upper || o->upper == o->vertices) return LATHE_OK;
-    lathe_range all = {o->at[0].x, o->at[0].y, o->at[0].x, o->at[0].y};
-    for (uint32_t e = 1; e < o->upper; e++) {
-        lathe_point p = o->at[e];
-        all = (lathe_range){imin(all.x0, p.x), imin(all.y0, p.y), imax(all.x1, p.x), imax(all.y1, p.y)};
-    }
-    all = lathe__cells_of(&all, LATHE_LATTICE_BITS);
-    size_t width = (size_t)(all.x1 - all.x0) + 1, cells = width * ((size_t)(all.y1 - all.y0) + 1);
-    uint32_t *head = LATHE_NEW(o->arena, uint32_t, cells), *chain = LATHE_NEW(o->arena, uint32_t, o->upper);
-    if (!head || !chain) return LATHE_ERR_MEMORY;
-    memset(head, 0xff, cells * sizeof *head);
+    int bits = 32 - __builtin_clz(o->upper);
+    lathe_point *square = LATHE_NEW(o->arena, lathe_point, o->upper);
+    uint32_t *chain = LATHE_NEW(o->arena, uint32_t, o->upper), *head = LATHE_NEW(o->arena, uint32_t, (size_t)1 << bits);
+    if (!square || !chain || !head) return LATHE_ERR_MEMORY;
+    memset(head, 0xff, sizeof *head << bits);
     for (uint32_t e = o->upper; e--;) {   /* so that chains ascend */
-        lathe_point p = o->at[e], q = o->at[o->next[e]];
-        int32_t x = (imin(p.x, q.x) >> LATHE_LATTICE_BITS) - all.x0, y = (imin(p.y, q.y) >> LATHE_LATTICE_BITS) - all.y0;
-        uint32_t *first = &head[(size_t)y * width + (size_t)x];
+        square[e] = square_of(o, e);
+        uint32_t *first = &head[square_hash(square[e], bits)];
         chain[e] = *first;
         *first = e;
     }
     for (uint32_t f = o->upper; f < o->vertices; f++) {
-        lathe_range b = square_range(o, f);
-        int32_t x = b.x0 >> LATHE_LATTICE_BITS, y = b.y0 >> LATHE_LATTICE_BITS;
-        if (x < all.x0 || x > all.x1 || y < all.y0 || y > all.y1) continue;
-        for (uint32_t e = head[(size_t)(y - all.y0) * width + (size_t)(x - all.x0)]; e != NONE; e = chain[e]) {
-            lathe_range a = square_range(o, e);
-            if (!lathe__ranges_meet(&a, &b)) continue;
+        lathe_point p = square_of(o, f);
+        for (uint32_t e = head[square_hash(p, bits)]; e != NONE; e = chain[e]) {
+            if (square[e].x != p.x || square[e].y != p.y) continue;
             lathe_status status = test_edges(o, e, f);
             if (status) return status;
         }
@@ -306,6 +301,8 @@ static lathe_status place_meetings(overlay *o) {
     memcpy(at, o->at, o->vertices * sizeof *at);
     o->at = at;
     o->extra = o->builder->mesh.vertex_count;
+    o->shift[0] = o->slab->base;
+    o->shift[1] = o->extra - o->vertices;
     for (uint32_t i = 0; i < o->meeting_count; i++) {
         const lathe_meeting *m = &o->meetings[i];
         lathe_point p = at[m->edge[0]], q = at[o->next[m->edge[0]]], *r = &at[o->vertices + i];
@@ -389,35 +386,43 @@ static lathe_status mark_inside(overlay *o) {
 
 /* ---- 2. cycles ---- */
 
+/* Twice the area of the triangle with the origin. */
+static uint64_t doubled(lathe_point a, lathe_point b) { return (uint64_t)((int64_t)a.x * b.y - (int64_t)a.y * b.x); }
+
 /* Walks the boundary of a cell of side p from the sub-edge (edge, rank): forward if it is of p, else back. */
 static void walk_cycle(overlay *o, int p, bool back, uint32_t edge, uint32_t rank) {
     uint32_t id = o->cycle_count++;
     cycle *c = &o->cycles[id];
-    *c = (cycle){.first = o->nodes_used, .parent = id, .next_hole = NONE, .of = (uint8_t)p};
+    *c = (cycle){.first = o->nodes_used, .parent = id, .next_hole = NONE, .of = (uint8_t)p, .loop = o->loop[edge]};
+    const uint32_t *first = o->first, *on = o->on;
+    uint32_t *node = o->nodes + c->first;
+    lathe_point last = {0, 0};
     for (;;) {
-        uint32_t i = o->first[edge] + rank, *mark = &o->cycle[edge + i];
+        uint32_t i = first[edge] + rank, *mark = &o->cycle[edge + i], meeting = NONE;
         if (*mark != NONE) break;
         *mark = id;
-        uint32_t begin = rank ? o->vertices + o->on[i - 1] : edge;
-        uint32_t end = i < o->first[edge + 1] ? o->vertices + o->on[i] : o->next[edge];
-        o->nodes[o->nodes_used++] = back ? end : begin;
-        uint32_t to = back ? begin : end;
-        if (to >= o->vertices) {
-            const lathe_meeting *m = &o->meetings[to - o->vertices];
-            int other = !side_of(o, edge);
-            back = !back;
-            edge = m->edge[other];
-            rank = m->rank[other] + !back;
-            c->meetings++;
-        } else if (back) {
-            edge = o->prev[edge];
-            rank = o->first[edge + 1] - o->first[edge];
+        if (back) {
+            *node = i < first[edge + 1] ? o->vertices + on[i] : o->next[edge];
+            if (rank) meeting = on[i - 1];
+            else edge = o->prev[edge], rank = first[edge + 1] - first[edge];
         } else {
-            edge = to;
-            rank = 0;
+            *node = rank ? o->vertices + on[i - 1] : edge;
+            if (i < first[edge + 1]) meeting = on[i];
+            else edge = o->next[edge], rank = 0;
         }
+        lathe_point here = o->at[*node++];
+        c->area += doubled(last, here);
+        last = here;
+        if (meeting == NONE) continue;
+        int other = !side_of(o, edge);
+        back = !back;
+        edge = o->meetings[meeting].edge[other];
+        rank = o->meetings[meeting].rank[other] + !back;
+        c->meetings++;
     }
+    o->nodes_used = (uint32_t)(node - o->nodes);
     c->count = o->nodes_used - c->first;
+    c->area += doubled(last, o->at[o->nodes[c->first]]);
 }
 
 static lathe_status find_cycles(overlay *o) {
@@ -448,17 +453,6 @@ static void unite(uint32_t *parent, uint32_t a, uint32_t b) {
 static uint32_t cell_of(const overlay *o, uint32_t c) {
     while (o->cycles[c].parent != c) c = o->cycles[c].parent;
     return c;
-}
-
-static bool turns_right(const overlay *o, const cycle *c) {
-    const uint32_t *n = o->nodes + c->first;
-    lathe_point p = o->at[n[0]];
-    double area = 0;
-    for (uint32_t i = 1; i + 1 < c->count; i++) {
-        lathe_point a = o->at[n[i]], b = o->at[n[i + 1]];
-        area += (double)(a.x - p.x) * (double)(b.y - p.y) - (double)(a.y - p.y) * (double)(b.x - p.x);
-    }
-    return area < 0;
 }
 
 /* Does edge f, where it crosses e, go on upwards to the right of it? */
@@ -494,7 +488,7 @@ static uint32_t left_of_hole(const overlay *o, const cycle *c) {
 static lathe_status group_cells(overlay *o) {
     for (uint32_t i = 0; i < o->cycle_count; i++) {
         cycle *c = &o->cycles[i];
-        c->hole = turns_right(o, c);
+        c->hole = (int64_t)c->area < 0;
         if (!c->hole) continue;
         lathe_status status = need_rows(o);
         if (status) return status;
@@ -522,20 +516,10 @@ static lathe_status link_loops(overlay *o) {
     memset(o->matched, 0, loops);
     memset(members, 0, (size_t)loops * 2 * sizeof *members);
     for (uint32_t i = 0; i < loops; i++) o->block[i] = i;
-    for (uint32_t i = 0; i < o->cycle_count; i++) {
-        uint32_t seen = NONE;
-        for (uint32_t c = o->cycles[i].parent == i ? i : NONE; c != NONE; c = o->cycles[c].next_hole)
-            for (uint32_t k = 0; k < o->cycles[c].count; k++) {
-                uint32_t n = o->nodes[o->cycles[c].first + k];
-                if (n >= o->vertices) continue;
-                uint32_t loop = o->loop[n];
-                if (seen != NONE && loop != seen) unite(o->block, loop, seen);
-                seen = loop;
-            }
-    }
-    /* A cell between a chain and a single crossed edge has no vertex of that edge's loop. */
+    /* A cycle changes from loop to loop at meetings only. */
     for (uint32_t m = 0; m < o->meeting_count; m++)
         unite(o->block, o->loop[o->meetings[m].edge[0]], o->loop[o->meetings[m].edge[1]]);
+    for (uint32_t i = 0; i < o->cycle_count; i++) unite(o->block, o->cycles[i].loop, o->cycles[o->cycles[i].parent].loop);
     for (uint32_t i = 0; i < loops; i++) members[find(o->block, i) * 2 + (i >= o->loops0)]++;
     for (uint32_t i = 0; COUNTED && i < loops; i++) {
         uint32_t a = members[i * 2], b = members[i * 2 + 1];
@@ -546,19 +530,14 @@ static lathe_status link_loops(overlay *o) {
 
 /* ---- 4. triangles ---- */
 
-static uint32_t mesh_vertex(const overlay *o, uint32_t node) {
-    if (node < o->upper) return o->slab->base[0] + node;
-    if (node < o->vertices) return o->slab->base[1] + (node - o->upper);
-    return o->extra + (node - o->vertices);
-}
+static uint32_t mesh_vertex(const overlay *o, uint32_t node) { return node + o->shift[node >= o->vertices]; }
 
 /* side of a node: 0, 1, or 2 for a meeting */
 static int node_side(const overlay *o, uint32_t node) { return (node >= o->upper) + (node >= o->vertices); }
 
 /* A triangle of nodes, counter-clockwise in the plane; p: the side its cell is inside of. */
 static void emit(overlay *o, int p, uint32_t a, uint32_t b, uint32_t c) {
-    lathe_mesh *mesh = &o->builder->mesh;
-    uint32_t *t = mesh->triangles[mesh->triangle_count++];
+    uint32_t *t = o->builder->mesh.triangles[o->builder->mesh.triangle_count++];
     t[0] = mesh_vertex(o, a);
     t[1 + p] = mesh_vertex(o, b);
     t[2 - p] = mesh_vertex(o, c);
@@ -570,9 +549,13 @@ typedef struct strip {
     const float *target;       /* per index of p: the index of q that the trees match it with; NULL: the shorter diagonal decides */
 } strip;
 
-static double distance2(lathe_point a, lathe_point b) {
-    double x = (double)a.x - b.x, y = (double)a.y - b.y;
-    return x * x + y * y;
+static uint64_t distance2(lathe_point a, lathe_point b) {
+    int64_t x = a.x - b.x, y = a.y - b.y;
+    return (uint64_t)(x * x + y * y);
+}
+
+static int64_t turn(lathe_point a, lathe_point b, lathe_point c) {
+    return (int64_t)(b.x - a.x) * (c.y - a.y) - (int64_t)(b.y - a.y) * (c.x - a.x);
 }
 
 /* Merges two chains by the shorter diagonal; false if some triangle would not be counter-clockwise (nothing is kept then).
@@ -588,24 +571,26 @@ static bool merge_strip(overlay *o, int side, const strip *s, bool open) {
         emit(o, side, last_p[-1], *last_p, last_q[-1]);
         p++, q++, last_p--, last_q--;
     }
+    const float *target = s->target ? s->target + (p - s->p) : NULL;
+    lathe_point a = at[*p], b = at[*q];
     while (p < last_p || q < last_q) {
-        bool can_p = p < last_p && lathe__turn(at, *p, p[1], *q) > 0;
-        bool can_q = q < last_q && lathe__turn(at, *p, q[1], *q) > 0;
-        if (s->target && p < last_p && q < last_q) {
+        lathe_point next_a = at[p < last_p ? p[1] : *p], next_b = at[q < last_q ? q[1] : *q];
+        bool can_p = turn(a, next_a, b) > 0, can_q = turn(a, next_b, b) > 0;   /* a chain's end does not turn */
+        if (target && p < last_p && q < last_q) {
             /* Corresponding edges leave the choice of their diagonal; a corresponding vertex waits. */
-            float t = s->target[p - s->p + 1], j = (float)(q - s->q);
-            if (t <= j) can_q = false;
-            else if (t > j + 1 || s->target[p - s->p] >= j + 1) can_p = false;
+            float j = (float)(q - s->q);
+            if (target[1] <= j) can_q = false;
+            else if (target[1] > j + 1 || target[0] >= j + 1) can_p = false;
         }
-        if (can_p && can_q) {
-            can_p = distance2(at[p[1]], at[*q]) <= distance2(at[*p], at[q[1]]);
-        }
+        if (can_p && can_q) can_p = distance2(next_a, b) <= distance2(a, next_b);
         if (can_p) {
             emit(o, side, *p, p[1], *q);
-            p++;
+            p++, target += !!target;
+            a = next_a;
         } else if (can_q) {
             emit(o, side, *p, q[1], *q);
             q++;
+            b = next_b;
         } else {
             *count = keep;
             return false;
@@ -703,7 +688,7 @@ static bool try_open_strip(overlay *o, const cycle *c) {
 static bool try_ring_strip(overlay *o, const cycle *outer, const cycle *hole) {
     const uint32_t *p = o->nodes + outer->first, *q = o->nodes + hole->first;
     uint32_t from = 0, size;
-    double least = -1;
+    uint64_t least = UINT64_MAX;
     const lathe_tube *tube = tube_of(o, p[0]);
     if (tube) {
         /* Begin where the trees do: at the partner of the outer loop's first vertex. */
@@ -715,8 +700,8 @@ static bool try_ring_strip(overlay *o, const cycle *outer, const cycle *hole) {
         else least = 0;
     }
     for (uint32_t i = 0; least != 0 && i < hole->count; i++) {
-        double d = distance2(o->at[p[0]], o->at[q[i]]);
-        if (least < 0 || d < least) { least = d; from = i; }
+        uint64_t d = distance2(o->at[p[0]], o->at[q[i]]);
+        if (d < least) { least = d; from = i; }
     }
     strip s;
     if (!new_strip(&s, o->arena, outer->count, hole->count)) return false;
@@ -782,6 +767,7 @@ static lathe_status triangulate_cell(overlay *o, uint32_t id) {
     uint32_t(*t)[3], *neighbour, count;
     lathe_status status = lathe__triangulate(&t, &neighbour, &count, o->arena, &polygon);
     if (status) return status;
+    const uint32_t *corner = (const uint32_t *)t;
     uint32_t *mid = LATHE_NEW(o->arena, uint32_t, (size_t)count * 3);
     if (!mid) return LATHE_ERR_MEMORY;
     memset(mid, 0xff, (size_t)count * 3 * sizeof *mid);
@@ -791,8 +777,10 @@ static lathe_status triangulate_cell(overlay *o, uint32_t id) {
     if (single && o->slab->caps) /* 3T - 2I edges bound the cell */
         shape = o->slab->caps->shape(o->slab->caps, &o->builder->mesh, count > 1 ? (count * 3 - total) / 2 : 1, sides >> 1);
     for (uint32_t i = 0; i < count * 3; i++) {
-        uint32_t a = t[i / 3][i % 3], b = t[i / 3][(i + 1) % 3], j = neighbour[i];
-        if (j == NONE || mid[i] != NONE || a >= o->vertices || node_side(o, a) != node_side(o, b)) continue;
+        uint32_t j = neighbour[i];
+        if (j == NONE || j < i) continue;
+        uint32_t a = corner[i], b = corner[i % 3 == 2 ? i - 2 : i + 1];
+        if (a >= o->vertices || node_side(o, a) != node_side(o, b)) continue;
         mid[i] = mid[j] = next_node(o);
         status = add_vertex(o, (o->at[a].x + o->at[b].x) / 2, (o->at[a].y + o->at[b].y) / 2, height_over(o, sides, shape, a, b));
         if (status) return status;

@@ -39,7 +39,7 @@ static inline int32_t lathe__cap_rise(uint32_t shape, int64_t square) {
 typedef struct lathe_slab {
     const lathe_outline *outline[2];   /* lower, upper; an outline without points is air */
     int32_t height[2];                 /* of the two slices, lattice units, height[0] < height[1] */
-    uint32_t base[2];                  /* where their vertices begin in the mesh */
+    uint32_t base;                     /* where their vertices begin in the mesh, the upper one's behind the lower one's */
     int32_t cap;                       /* how far a cell of a single outline rises from its slice, lattice units, */
     lathe_caps *caps;                  /* or of its own shape; NULL: cap */
     bool lattice;                      /* every edge lies within one pixel square */

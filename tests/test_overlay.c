@@ -64,7 +64,7 @@ typedef struct expected {
 static lathe_overlay_counts slab_counts(const lathe_outline *low, const lathe_outline *high, uint32_t *triangles) {
     lathe_mesh_builder builder = {0};
     lathe_overlay_counts counts = {0};
-    lathe_slab slab = {.outline = {low, high}, .height = {0, LATHE_LATTICE_ONE}, .base = {0, low->point_count}, .cap = LATHE_LATTICE_ONE / 2};
+    lathe_slab slab = {.outline = {low, high}, .height = {0, LATHE_LATTICE_ONE}, .base = 0, .cap = LATHE_LATTICE_ONE / 2};
     uint32_t points = low->point_count + high->point_count;
     if (lathe__builder_reserve(&builder, points, 0)) abort();
     builder.mesh.vertex_count = points;
@@ -246,7 +246,7 @@ static double area2(const lathe_mesh *m, const uint32_t *t) {
 static void check_single_valued(const lathe_outline *low, const lathe_outline *high, const char *name) {
     lathe_mesh_builder builder = {0};
     lathe_overlay_counts counts = {0};
-    lathe_slab slab = {.outline = {low, high}, .height = {0, LATHE_LATTICE_ONE}, .base = {0, low->point_count}, .cap = LATHE_LATTICE_ONE / 2};
+    lathe_slab slab = {.outline = {low, high}, .height = {0, LATHE_LATTICE_ONE}, .base = 0, .cap = LATHE_LATTICE_ONE / 2};
     if (lathe__builder_reserve(&builder, low->point_count + high->point_count, 0)) abort();
     for (int s = 0; s < 2; s++)
         for (uint32_t i = 0; i < slab.outline[s]->point_count; i++) {

@@ -18,7 +18,7 @@ typedef struct slab {
 } slab;
 
 static void build(slab *s) {
-    lathe_slab between = {.outline = {&s->side[0], &s->side[1]}, .height = {0, LATHE_LATTICE_ONE}, .base = {0, s->side[0].point_count},
+    lathe_slab between = {.outline = {&s->side[0], &s->side[1]}, .height = {0, LATHE_LATTICE_ONE}, .base = 0,
                           .cap = LATHE_LATTICE_ONE / 2};
     s->builder = (lathe_mesh_builder){0};
     s->counts = (lathe_overlay_counts){0};

@@ -18,7 +18,7 @@ lathe_status lathe__slab_overlay(lathe_mesh *out, uint64_t *contacts, lathe_aren
     lathe_overlay_counts counts = {0};
     lathe_slab overlay = {.outline = {in->outline[0], in->outline[1]},
                           .height = {in->height[0], in->height[1]},
-                          .base = {0, in->outline[0]->point_count},
+                          .base = 0,
                           .cap = cap,
                           .lattice = in->lattice};
     lathe_status status = lathe__start_slab(&builder, in);
