@@ -49,8 +49,7 @@ typedef struct overlay {
     uint32_t *first;           /* edge -> its first meeting in `on`; one more than there are */
     uint32_t *on;              /* meetings edge by edge, in order */
     uint32_t *cycle;           /* sub-edge (edge + first[edge] + rank) -> the cycle it bounds, or NONE */
-    uint8_t *inside;           /* sub-edge: within the other region? */
-    lathe_grid rows;           /* edges by pixel row, horizontal ones left out; once asked for. Of lattice outlines, */
+    lathe_grid rows;           /* edges by pixel row, horizontal ones left out. Of lattice outlines, */
     uint32_t *row, *row_chain; /* whose edges lie in one row each: row -> its first edge, edge -> the next one, or NONE */
     int32_t row0;              /* of row[0] */
     lathe_meeting *meetings;
@@ -254,16 +253,15 @@ static lathe_status order_meetings(overlay *o) {
     o->first = LATHE_NEW(o->arena, uint32_t, n + 2);
     o->on = LATHE_NEW(o->arena, uint32_t, 2 * o->meeting_count);
     o->cycle = LATHE_NEW(o->arena, uint32_t, subs);
-    o->inside = LATHE_NEW(o->arena, uint8_t, subs);
-    if (!o->first || !o->on || !o->cycle || !o->inside) return LATHE_ERR_MEMORY;
+    if (!o->first || !o->on || !o->cycle) return LATHE_ERR_MEMORY;
     memset(o->first, 0, (n + 2) * sizeof *o->first);
     memset(o->cycle, 0xff, subs * sizeof *o->cycle);
     for (uint32_t i = 0; i < 2 * o->meeting_count; i++) o->first[o->meetings[i / 2].edge[i % 2] + 2]++;
     for (uint32_t e = 2; e < n + 2; e++) o->first[e] += o->first[e - 1];
     for (uint32_t i = 0; i < 2 * o->meeting_count; i++) o->on[o->first[o->meetings[i / 2].edge[i % 2] + 1]++] = i / 2;
-    for (uint32_t e = 0; e < n; e++) {
-        int s = side_of(o, e);
-        uint32_t begin = o->first[e], end = o->first[e + 1];
+    for (uint32_t begin = 0, end; begin < 2 * o->meeting_count; begin = end) {
+        int s = begin >= o->meeting_count;   /* each meeting has an edge of either side */
+        end = o->first[o->meetings[o->on[begin]].edge[s] + 1];
         for (uint32_t i = begin + 1; i < end; i++) {
             uint32_t m = o->on[i], j = i;
             for (; j > begin && before(&o->meetings[m], &o->meetings[o->on[j - 1]], s); j--) o->on[j] = o->on[j - 1];
@@ -356,32 +354,18 @@ static lathe_status chain_rows(overlay *o) {
     return LATHE_OK;
 }
 
-static lathe_status need_rows(overlay *o) {
-    if (o->row || o->rows.first) return LATHE_OK;
+static lathe_status list_rows(overlay *o) {
     if (CHAINED && o->slab->lattice) return chain_rows(o);
     const lathe_range *ranges = list_ranges(o, true);
     return ranges ? lathe__grid_build(&o->rows, o->arena, ranges, o->vertices, UINT64_MAX) : LATHE_ERR_MEMORY;
 }
 
-static lathe_status mark_inside(overlay *o) {
-    for (uint32_t l = 0; l < o->loops; l++) {
-        uint32_t begin = o->loop_first[l], end = o->loop_first[l + 1];
-        bool now;
-        if (o->first[begin] != o->first[end]) {
-            now = o->meetings[o->on[o->first[begin]]].enters == (l >= o->loops0);
-        } else {
-            lathe_status status = need_rows(o);
-            if (status) return status;
-            uint32_t e = nearest_left(o, begin, l < o->loops0 ? 2 : 1);
-            now = e != NONE && goes_down(o, e);
-        }
-        for (uint32_t e = begin; e < end; e++) {
-            uint32_t sub = e + o->first[e], last = e + o->first[e + 1];
-            o->inside[sub] = now;
-            while (sub++ < last) o->inside[sub] = now = !now;
-        }
-    }
-    return LATHE_OK;
+/* Does a loop begin within the other region? */
+static bool begins_inside(const overlay *o, uint32_t loop) {
+    uint32_t begin = o->loop_first[loop], meeting = o->first[begin];
+    if (meeting != o->first[o->loop_first[loop + 1]]) return o->meetings[o->on[meeting]].enters == (loop >= o->loops0);
+    uint32_t e = nearest_left(o, begin, loop < o->loops0 ? 2 : 1);
+    return e != NONE && goes_down(o, e);
 }
 
 /* ---- 2. cycles ---- */
@@ -429,11 +413,21 @@ static lathe_status find_cycles(overlay *o) {
     o->nodes = LATHE_NEW(o->arena, uint32_t, o->vertices + 2 * o->meeting_count);
     o->cycles = LATHE_NEW(o->arena, cycle, o->loops + o->meeting_count + 1);
     if (!o->nodes || !o->cycles) return LATHE_ERR_MEMORY;
-    for (uint32_t e = 0; e < o->vertices; e++)
-        for (uint32_t i = o->first[e]; i <= o->first[e + 1]; i++) {
-            bool inside = o->inside[e + i];
-            if (o->cycle[e + i] == NONE) walk_cycle(o, side_of(o, e) ^ inside, inside, e, i - o->first[e]);
+    lathe_status status = list_rows(o);
+    if (status) return status;
+    for (uint32_t l = 0; l < o->loops; l++) {
+        /* One cycle before the loop's first meeting, one behind each; inside and outside take turns. */
+        bool inside = begins_inside(o, l);
+        uint32_t edge = o->loop_first[l], rank = 0, meeting = o->first[edge], last = o->first[o->loop_first[l + 1]];
+        int side = l >= o->loops0;
+        for (;; meeting++) {
+            if (o->cycle[edge + o->first[edge] + rank] == NONE) walk_cycle(o, side ^ inside, inside, edge, rank);
+            if (meeting == last) break;
+            edge = o->meetings[o->on[meeting]].edge[side];
+            rank = o->meetings[o->on[meeting]].rank[side] + 1;
+            inside = !inside;
         }
+    }
     return LATHE_OK;
 }
 
@@ -490,8 +484,6 @@ static lathe_status group_cells(overlay *o) {
         cycle *c = &o->cycles[i];
         c->hole = (int64_t)c->area < 0;
         if (!c->hole) continue;
-        lathe_status status = need_rows(o);
-        if (status) return status;
         uint32_t other = left_of_hole(o, c);
         if (other != NONE && o->cycles[other].of == c->of && cell_of(o, other) != i) c->parent = other;
     }
@@ -840,7 +832,7 @@ lathe_status lathe__overlay_slab(lathe_mesh_builder *builder, lathe_arena *arena
     overlay o = {.slab = slab, .builder = builder, .arena = arena, .counts = counts};
     lathe_status status = link_vertices(&o);
     if (status || !o.vertices) return status;
-    static lathe_status (*const step[])(overlay *) = {find_meetings, place_meetings, order_meetings, mark_inside, find_cycles};
+    static lathe_status (*const step[])(overlay *) = {find_meetings, place_meetings, order_meetings, find_cycles};
     for (size_t i = 0; i < sizeof step / sizeof *step; i++)
         if ((status = step[i](&o)) != LATHE_OK) return status;
     counts->crossings += o.meeting_count * COUNTED;
