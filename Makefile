@@ -61,8 +61,11 @@ ALL_CXXFLAGS = -std=c++17 $(COMMON) $(CXXFLAGS)
 LIBS := -Wl,--as-needed -lmicrohttpd -ljansson -ldraco -lnifti2 -lznz -lz -lbrotlienc -lpthread -lm
 
 WASM := build/wasm/lathe.wasm
+RASTERS := build/wasm/rasters.wasm
 VIEWER := web/dist/viewer.html
 DRACO_PAGE := web/dist/draco.html
+# What is linked into the program: lathe_NAME and the file in web/dist.
+EMBEDDED := viewer_html:viewer.html extras_js:extras.js decoder_text:decoder.txt rasters_text:rasters.txt draco_html:draco.html
 
 # ---- the program -------------------------------------------------------------------------------------------------------
 
@@ -82,7 +85,7 @@ $(LIBRARY): $(LIBRARY_OBJECTS)
 $(SERVER_LIBRARY): $(SERVER_OBJECTS)
 	$(Q)rm -f $@ && $(AR) rcs $@ $^
 
-$(B)/lathe: $(B)/server/main.o $(B)/server/viewer_page.o $(B)/server/draco_page.o $(B)/server/extras_script.o $(SERVER_LIBRARY) $(LIBRARY)
+$(B)/lathe: $(B)/server/main.o $(foreach pair,$(EMBEDDED),$(B)/server/embedded_$(firstword $(subst :, ,$(pair))).o) $(SERVER_LIBRARY) $(LIBRARY)
 	@echo "  link  $@"
 	$(Q)$(CXX) $(LINK_MODE) $(LDFLAGS) -o $@ $^ $(LIBS)
 
@@ -99,17 +102,13 @@ $(B)/%.o: %.cpp
 	@echo "  c++   $<"
 	$(Q)$(CXX) $(ALL_CXXFLAGS) -c -o $@ $<
 
-# The viewer page is linked into the program as it is.
-$(B)/server/viewer_page.o: server/viewer_page.S $(VIEWER)
-	@mkdir -p $(@D)
-	$(Q)$(CC) -DPAGE='"$(VIEWER)"' -c -o $@ $<
-# Written with the page.
-$(B)/server/extras_script.o: server/extras_script.S $(VIEWER)
-	@mkdir -p $(@D)
-	$(Q)$(CC) -DPAGE='"$(dir $(VIEWER))extras.js"' -c -o $@ $<
-$(B)/server/draco_page.o: server/draco_page.S $(DRACO_PAGE)
-	@mkdir -p $(@D)
-	$(Q)$(CC) -DPAGE='"$(DRACO_PAGE)"' -c -o $@ $<
+# The pages, the scripts and the decoders are linked into the program as they are.
+define embed
+$(B)/server/embedded_$(1).o: server/embedded.S web/dist/$(2)
+	@mkdir -p $$(@D)
+	$$(Q)$$(CC) -DNAME=lathe_$(1) -DFILE='"web/dist/$(2)"' -c -o $$@ $$<
+endef
+$(foreach pair,$(EMBEDDED),$(eval $(call embed,$(firstword $(subst :, ,$(pair))),$(lastword $(subst :, ,$(pair))))))
 
 # ---- the viewer and its decoder ----------------------------------------------------------------------------------------
 
@@ -124,27 +123,36 @@ WASM_LINK := --no-entry --gc-sections --strip-all --stack-first -z stack-size=26
 WASM_BUILTINS = $(firstword $(shell find -L $$($(CLANG) -print-resource-dir)/lib -name 'libclang_rt.builtins*wasm32*.a' 2>/dev/null))
 
 .PHONY: wasm web
-wasm: $(WASM) ## the decoder as wasm: build/wasm/lathe.wasm
+wasm: $(WASM) $(RASTERS) ## the decoder as wasm: build/wasm/lathe.wasm; of rasters alone: build/wasm/rasters.wasm
 web: $(VIEWER) $(DRACO_PAGE) ## the viewer page: web/dist/viewer.html; the page of the Draco deltas
 
 HOT := $(addsuffix %,$(addprefix codec/,occupancy_ range_ pyramid) $(addprefix core/,triangulate grid overlay outline centre crossing))
 # Where the time goes: 1.6 kB more, a fifth faster.
-$(patsubst %.c,build/wasm/%.o,$(filter $(HOT),$(WASM_SOURCES))): WASM_OPTIMISE := -O2 -fno-unroll-loops
+$(foreach dir,build/wasm build/wasm/rasters,$(patsubst %.c,$(dir)/%.o,$(filter $(HOT),$(WASM_SOURCES)))): WASM_OPTIMISE := -O2 -fno-unroll-loops
 
 build/wasm/%.o: %.c
 	@mkdir -p $(@D)
 	@echo "  wasm  $<"
 	$(Q)$(CLANG) $(WASM_FLAGS) -c -o $@ $<
+# The same sources: what a decoder of rasters never does is dropped by the linker.
+build/wasm/rasters/%.o: %.c
+	@mkdir -p $(@D)
+	@echo "  wasm  $< (rasters)"
+	$(Q)$(CLANG) $(WASM_FLAGS) -DLATHE_RASTERS -c -o $@ $<
 $(WASM): $(WASM_SOURCES:%.c=build/wasm/%.o)
+$(RASTERS): $(WASM_SOURCES:%.c=build/wasm/rasters/%.o)
+$(WASM) $(RASTERS):
 	@echo "  link  $@"
 	$(Q)$(WASM_LD) $(WASM_LINK) -o $@ $^ $(WASM_BUILTINS)
 
 web/node_modules/.package-lock.json: web/package-lock.json
 	@echo "  npm   web"
 	$(Q)cd web && npm ci --no-audit --no-fund --loglevel=error && touch node_modules/.package-lock.json
-$(VIEWER): $(WASM) web/node_modules/.package-lock.json web/build.mjs $(wildcard web/src/* web/*.json)
+$(VIEWER): $(WASM) $(RASTERS) web/node_modules/.package-lock.json web/build.mjs $(wildcard web/src/* web/*.json)
 	@echo "  web   $@"
-	$(Q)cd web && node build.mjs ../$(WASM) ../$(VIEWER)
+	$(Q)cd web && node build.mjs ../$(WASM) ../$(RASTERS) ../$(VIEWER)
+# Written with the page.
+$(addprefix web/dist/,extras.js decoder.txt rasters.txt): $(VIEWER)
 $(DRACO_PAGE): web/node_modules/.package-lock.json web/build_draco.mjs $(wildcard web/src/draco*)
 	@echo "  web   $@"
 	$(Q)cd web && node build_draco.mjs ../$(DRACO_PAGE)

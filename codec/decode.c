@@ -124,8 +124,9 @@ static lathe_status next_packet(lathe_decoder *d, const uint8_t **payload, uint3
     if (!d->has_header) {
         lathe_status status = lathe__header_parse(&d->header, &reader);
         if (status) return reading(d, &reader, status);
-        status = start_structures(d);
-        if (status) return fail(d, status, LATHE_FAULT("header"));
+        bool strange = LATHE_RASTERS_ONLY && !(lathe__header_flags(&d->header) & LATHE_FLAG_PYRAMID);
+        status = strange ? LATHE_ERR_FORMAT : start_structures(d);
+        if (status) return fail(d, status, strange ? "the model is not made of rasters: the whole decoder reads it" : LATHE_FAULT("header"));
         d->has_header = true;
         d->used = (size_t)(reader.at - d->bytes);
     }
@@ -167,7 +168,7 @@ static lathe_status shared_step(lathe_decoder *d, const uint8_t *payload, uint32
 
 static lathe_status single_step(lathe_decoder *d, const uint8_t *payload, uint32_t size, const char **fault) {
     lathe_structure_state *state = &d->states[d->next_structure];
-    if (!state->pyramid) return lathe__structure_decode(state, &d->arena[0], &d->models, d->head.level, payload, size, fault);
+    if (!state->pyramid && !LATHE_RASTERS_ONLY) return lathe__structure_decode(state, &d->arena[0], &d->models, d->head.level, payload, size, fault);
     lathe__decoder_start(&d->code, payload, size);
     return lathe__pass_decode(state, &d->code, &d->models, d->head.level, fault);
 }

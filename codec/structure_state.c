@@ -36,7 +36,7 @@ void lathe__models_start(lathe_models *models, const lathe_header *header) {
     bool shared = header->parameter_count > 1 && header->parameters[1] & LATHE_FLAG_SHARED;
     int64_t most = 0;
     models->widest[0] = models->widest[1] = 3;
-    lathe__base_models(models->base);
+    if (!LATHE_RASTERS_ONLY) lathe__base_models(models->base);
     for (uint32_t i = 0; shared && i < header->structure_count; i++) {
         const int32_t *size = header->structures[i].size;
         if ((int64_t)size[0] * size[1] <= most) continue;
@@ -179,34 +179,40 @@ lathe_status lathe__state_slices(int32_t **out, uint32_t *count, lathe_arena *ar
 
 /* Vertices lie where the grey values cross on average; where strides are larger than a voxel, that is the middle. */
 static lathe_status raster_mesh(lathe_mesh *out, lathe_arena arena[2], const lathe_structure_state *state, lathe_caps *caps,
-                                 lathe_surface_counts *counts) {
+                                lathe_surface_counts *counts, uint32_t *shown) {
     const lathe_mask *raster = state->raster.bits ? &state->raster : &state->mask;
     bool whole = raster == &state->mask;
     lathe_surface_style style = {.fraction = whole ? state->fraction : LATHE_FRACTION_ONE / 2, .caps = whole ? caps : NULL};
+    *shown = (uint32_t)raster->size[2];
     return lathe__pyramid_mesh(out, arena, raster, state->stride, state->mask.size, &style, counts);
+}
+
+/* A level of whole slices, or of stars. */
+static lathe_status slices_mesh(lathe_mesh *out, lathe_arena arena[2], const lathe_structure_state *state, lathe_caps *caps,
+                                lathe_surface_counts *counts, uint32_t *shown) {
+    lathe_arena list = {0};
+    int32_t *slices;
+    lathe_status status = lathe__state_slices(&slices, shown, &list, state);
+    bool last = (uint32_t)state->level + 1 == state->plan.level_count;
+    lathe_surface_style style = {.fraction = state->fraction, .coarseness = state->plan.level_count - 1 - (uint32_t)state->level,
+                                 .finer = state->finer, .caps = last ? caps : NULL};
+    if (!status && !state->level && !state->exact_base) status = base_mesh(out, arena, state, slices, *shown, counts);
+    else if (!status) status = lathe__build_styled(out, arena, &state->mask, slices, *shown, &style, counts);
+    lathe__arena_free(&list);
+    return status;
 }
 
 lathe_status lathe__state_mesh(lathe_mesh *out, lathe_arena arena[2], const lathe_structure_state *state,
                                lathe_surface_counts *counts, uint32_t *shown) {
-    int32_t *slices;
     *counts = (lathe_surface_counts){0};
     if (!lathe__state_known(state)) return LATHE_ERR_RANGE;
-    if (state->radii) return lathe__radii_mesh(out, arena, state->radii, (uint32_t)state->level, counts, shown);
-    lathe_arena list = {0};
-    lathe_status status = lathe__state_slices(&slices, shown, &list, state);
-    if (!status) {
-        cap_reader reader = {.caps = {read_shape, NULL}, .code = state->cap_code};
-        lathe__number_start(reader.models, LATHE_CAP_MODELS, LATHE_NUMBER_START);
-        bool last = (uint32_t)state->level + 1 == state->plan.level_count;
-        lathe_caps *caps = state->cap_bytes ? &reader.caps : state->caps;
-        lathe_surface_style style = {.fraction = state->fraction, .coarseness = state->plan.level_count - 1 - (uint32_t)state->level,
-                                     .finer = state->finer, .caps = last ? caps : NULL};
-        if (state->pyramid) status = raster_mesh(out, arena, state, caps, counts);
-        else if (!state->level && !state->exact_base) status = base_mesh(out, arena, state, slices, *shown, counts);
-        else status = lathe__build_styled(out, arena, &state->mask, slices, *shown, &style, counts);
-    }
+    if (state->radii && !LATHE_RASTERS_ONLY) return lathe__radii_mesh(out, arena, state->radii, (uint32_t)state->level, counts, shown);
+    cap_reader reader = {.caps = {read_shape, NULL}, .code = state->cap_code};
+    lathe__number_start(reader.models, LATHE_CAP_MODELS, LATHE_NUMBER_START);
+    lathe_caps *caps = state->cap_bytes ? &reader.caps : state->caps;
+    lathe_status status = LATHE_RASTERS_ONLY || state->pyramid ? raster_mesh(out, arena, state, caps, counts, shown)
+                                                               : slices_mesh(out, arena, state, caps, counts, shown);
     lathe__arena_reset(&arena[0]);
     lathe__arena_reset(&arena[1]);
-    lathe__arena_free(&list);
     return status;
 }

@@ -51,7 +51,7 @@ static lathe_status overlay_roomy(lathe_mesh_builder *builder, lathe_arena *scra
                                   uint32_t tries) {
     const lathe_outline *upper = slab->outline[1];
     slab->crowded = NULL;
-    if (tries) {
+    if (tries && !LATHE_RASTERS_ONLY) {
         slab->crowded = LATHE_NEW(scratch, uint8_t, upper->point_count + 1);
         if (!slab->crowded) return LATHE_ERR_MEMORY;
         memset(slab->crowded, 0, upper->point_count);
@@ -60,7 +60,7 @@ static lathe_status overlay_roomy(lathe_mesh_builder *builder, lathe_arena *scra
     for (uint32_t i = 0; tries && i < upper->point_count; i++) {
         int32_t *v = builder->mesh.lattice[slab->base + slab->outline[0]->point_count + i];
         lathe_point *p = &upper->points[i];
-        if (status != LATHE_ERR_RANGE) v[0] = p->x, v[1] = p->y;
+        if (LATHE_RASTERS_ONLY || status != LATHE_ERR_RANGE) v[0] = p->x, v[1] = p->y;
         else if (slab->crowded[i]) *p = lathe__jitter((lathe_point){v[0], v[1]}, tries);
     }
     return status;
@@ -85,7 +85,7 @@ lathe_status lathe__stack_with_caps(lathe_mesh *out, lathe_arena *scratch, const
                            .height = {(i ? heights[i - 1] : heights[0] - 1) * LATHE_LATTICE_ONE,
                                       (i < count ? heights[i] : heights[count - 1] + 1) * LATHE_LATTICE_ONE},
                            .base = base, .cap = LATHE_LATTICE_ONE / 2, .caps = caps, .lattice = lattice};
-        for (uint32_t tries = lattice ? 0 : TRIES; !status; tries--) {
+        for (uint32_t tries = LATHE_RASTERS_ONLY || lattice ? 0 : TRIES; !status; tries--) {
             status = overlay_roomy(&builder, scratch, &slab, &counts->overlay, tries);
             lathe__arena_reset(scratch);
             if (status != LATHE_ERR_RANGE) break;
@@ -134,7 +134,7 @@ lathe_status lathe__level_outlines(lathe_outline **out, lathe_arena arena[2], co
                                  .parity = (int)(i & 1), .fraction = style->fraction};
         uint32_t coarseness = style->coarseness - (style->finer ? style->finer[i] : 0);
         lathe_status status;
-        if (coarseness) {
+        if (coarseness && !LATHE_RASTERS_ONLY) {
             lathe_outline loops;
             status = lathe__trace_outline(&loops, NULL, scratch, &view);
             if (!status) status = lathe__refine_outline(&outlines[i], keep, &loops, coarseness, i);

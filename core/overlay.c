@@ -18,10 +18,8 @@ enum { NONE = 0xffffffffu };
 enum { ROOM = 64, SPACING = 8 }; /* lattice units: what rounding cannot bridge */
 #ifdef LATHE_SMALL
 enum { COUNTED = 0 };          /* nobody asks a small decoder how its joints turned out */
-enum { CHAINED = 1 };
 #else
 enum { COUNTED = 1 };
-enum { CHAINED = 1 };
 #endif
 
 typedef struct cycle {
@@ -67,6 +65,8 @@ typedef struct overlay {
     bool harmed;               /* something is crowded */
 } overlay;
 
+static bool is_lattice(const overlay *o) { return LATHE_RASTERS_ONLY || o->slab->lattice; }
+static uint8_t *crowded_of(const overlay *o) { return LATHE_RASTERS_ONLY ? NULL : o->slab->crowded; }
 static int side_of(const overlay *o, uint32_t vertex) { return vertex >= o->upper; }
 
 /* ---- 1. meetings ---- */
@@ -125,7 +125,7 @@ static int32_t imax(int32_t a, int32_t b) { return a > b ? a : b; }
 
 /* Marks edge b of the upper outline. */
 static void mark_crowded(overlay *o, uint32_t b) {
-    uint8_t *crowded = o->slab->crowded - o->upper;
+    uint8_t *crowded = crowded_of(o) - o->upper;
     crowded[b] = crowded[o->next[b]] = o->harmed = true;
 }
 
@@ -140,7 +140,7 @@ static bool have_room(const overlay *o, uint32_t a, uint32_t b) {
 
 static lathe_status test_edges(overlay *o, uint32_t a, uint32_t b) {
     uint32_t a1 = o->next[a], b1 = o->next[b];
-    if (o->slab->crowded && !have_room(o, a, b)) mark_crowded(o, b);
+    if (crowded_of(o) && !have_room(o, a, b)) mark_crowded(o, b);
     if (a >= o->upper) return LATHE_OK;
     int64_t d1 = lathe__turn(o->at, a, a1, b), d2 = lathe__turn(o->at, a, a1, b1);
     if ((d1 > 0) == (d2 > 0)) return LATHE_OK;
@@ -160,10 +160,10 @@ static lathe_range *list_ranges(const overlay *o, bool rows) {
         if (rows) {
             r.x0 = r.x1 = 0;
             if (r.y0 == r.y1) r.y1 -= LATHE_LATTICE_ONE;
-        } else if (o->slab->lattice) {
+        } else if (is_lattice(o)) {
             r.x1 = imax(r.x1 - 1, r.x0);
             r.y1 = imax(r.y1 - 1, r.y0);
-        } else if (o->slab->crowded) {
+        } else if (crowded_of(o)) {
             r.x0 -= ROOM, r.y0 -= ROOM, r.x1 += ROOM, r.y1 += ROOM;
         }
         ranges[e] = r;
@@ -207,13 +207,13 @@ static lathe_status find_lattice_meetings(overlay *o) {
 }
 
 static lathe_status find_meetings(overlay *o) {
-    if (CHAINED && o->slab->lattice && !o->slab->crowded) return find_lattice_meetings(o);
-    uint32_t below = o->slab->crowded ? o->vertices : o->upper;   /* what the upper outline is held against */
+    if (is_lattice(o) && !crowded_of(o)) return find_lattice_meetings(o);
+    uint32_t below = crowded_of(o) ? o->vertices : o->upper;   /* what the upper outline is held against */
     if (!below || o->upper == o->vertices) return LATHE_OK;
     lathe_grid grid;
     const lathe_range *ranges = list_ranges(o, false);
     if (!ranges) return LATHE_ERR_MEMORY;
-    lathe_status status = lathe__grid_build(&grid, o->arena, ranges, below, o->slab->lattice ? UINT64_MAX : 4 * (uint64_t)below);
+    lathe_status status = lathe__grid_build(&grid, o->arena, ranges, below, is_lattice(o) ? UINT64_MAX : 4 * (uint64_t)below);
     if (status) return status;
     for (uint32_t f = o->upper; f < o->vertices; f++) {
         lathe_range b = lathe__cells_of(&ranges[f], grid.shift);
@@ -269,7 +269,7 @@ static lathe_status order_meetings(overlay *o) {
         }
         for (uint32_t i = begin; i < end; i++) {
             o->meetings[o->on[i]].rank[s] = i - begin;
-            if (o->slab->crowded && i > begin) test_spacing(o, o->on[i - 1], o->on[i]);
+            if (crowded_of(o) && i > begin) test_spacing(o, o->on[i - 1], o->on[i]);
         }
     }
     if (!o->harmed) return LATHE_OK;
@@ -322,7 +322,7 @@ static uint32_t nearest_left(const overlay *o, uint32_t vertex, int sides) {
     uint32_t best = NONE;
     lathe_left nearest = LATHE_NOTHING_LEFT;
     int32_t y = at.y >> LATHE_LATTICE_BITS;
-    bool chained = CHAINED && o->row;
+    bool chained = LATHE_RASTERS_ONLY || o->row;
     const uint32_t *first = chained ? NULL : o->rows.first + (y - o->rows.cells.y0);
     for (uint32_t i = chained ? o->row[y - o->row0] : first[0]; chained ? i != NONE : i < first[1]; i = chained ? o->row_chain[i] : i + 1) {
         uint32_t e = chained ? i : o->rows.entry[i];
@@ -355,7 +355,7 @@ static lathe_status chain_rows(overlay *o) {
 }
 
 static lathe_status list_rows(overlay *o) {
-    if (CHAINED && o->slab->lattice) return chain_rows(o);
+    if (is_lattice(o)) return chain_rows(o);
     const lathe_range *ranges = list_ranges(o, true);
     return ranges ? lathe__grid_build(&o->rows, o->arena, ranges, o->vertices, UINT64_MAX) : LATHE_ERR_MEMORY;
 }

@@ -1,6 +1,6 @@
 /* /m/{model}: the viewer on one model in one response. The page as it was built has one placeholder, which becomes the
- * manifest and the base shape, so that the first bytes a browser gets are all it needs to draw. / : the same page
- * without a model; it then lists those there are. */
+ * manifest, the base shape and the smallest decoder that reads them, so that the first bytes a browser gets are all it
+ * needs to draw. / : the same page without a model; it then lists those there are. */
 #include "service.h"
 #include <stdio.h>
 #include <string.h>
@@ -29,6 +29,11 @@ static lathe_status write_model(lathe_buffer *out, const page *p) {
     if (!status && lathe__buffer_text(out, "</script><script id=\"base\" type=\"text/plain\">"))
         status = LATHE_ERR_MEMORY;
     if (!status) status = write_base(out, p);
+    if (!status && lathe__buffer_text(out, "</script><script id=\"wasm\" type=\"text/plain\">")) status = LATHE_ERR_MEMORY;
+    bool rasters = lathe_model_describe(p->entry->model)->pyramid;
+    if (!status && lathe__buffer_append(out, rasters ? lathe_rasters_text : lathe_decoder_text,
+                                        rasters ? lathe_rasters_text_size : lathe_decoder_text_size))
+        status = LATHE_ERR_MEMORY;
     if (!status && lathe__buffer_text(out, "</script>")) status = LATHE_ERR_MEMORY;
     return status;
 }

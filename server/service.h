@@ -204,6 +204,10 @@ lathe_status lathe__json_write(lathe_buffer *out, json_t *json);
 
 extern const unsigned char lathe_viewer_html[];
 extern const size_t lathe_viewer_html_size;
+extern const unsigned char lathe_decoder_text[];   /* a decoder as the page carries it: of every model */
+extern const size_t lathe_decoder_text_size;
+extern const unsigned char lathe_rasters_text[];   /* of models made of rasters */
+extern const size_t lathe_rasters_text_size;
 extern const unsigned char lathe_extras_js[];
 extern const size_t lathe_extras_js_size;
 extern const unsigned char lathe_draco_html[];

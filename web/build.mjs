@@ -1,11 +1,14 @@
-// Builds the viewer: node build.mjs [DECODER.wasm [VIEWER.html]]. One page with style, script and decoder in it.
+// Builds the viewer: node build.mjs [DECODER.wasm [RASTERS.wasm [VIEWER.html]]]. One page with style and script in it; beside it the
+// two decoders as text, of which the server puts one into the page: decoder.txt reads every model, rasters.txt those made of rasters.
 import { build, transform } from 'esbuild';
 import { mkdir, readFile, writeFile } from 'node:fs/promises';
 import { dirname } from 'node:path';
 import { fileURLToPath } from 'node:url';
 
 const here = (path) => fileURLToPath(new URL(path, import.meta.url));
-const [wasmPath = here('../build/wasm/lathe.wasm'), pagePath = here('dist/viewer.html')] = process.argv.slice(2);
+const [wasmPath = here('../build/wasm/lathe.wasm'), rastersPath = here('../build/wasm/rasters.wasm'), pagePath = here('dist/viewer.html')] =
+    process.argv.slice(2);
+const beside = (name) => pagePath.replace(/[^/]*$/, name);
 
 /** Shaders without comments and needless space; preprocessor lines keep their line ends. */
 const shaders = {
@@ -51,15 +54,17 @@ const script = bundle.outputFiles[0].text.trim();
 if (/<\/script|<!--/i.test(script)) throw Error('the script would end its own element');
 
 const style = (await transform(await readFile(here('src/style.css'), 'utf8'), { loader: 'css', minify: true })).code.trim();
-const parts = { STYLE: style, SCRIPT: script, WASM: textOfBytes(await readFile(wasmPath)) };
+const parts = { STYLE: style, SCRIPT: script };
 const template = (await readFile(here('src/page.html'), 'utf8')).replace(/>\s+</g, '><').replace(/\s+/g, ' ').trim();
 const page = template.replace(/\/\*([A-Z]+)\*\//g, (_, part) => parts[part]);
 
 // What is loaded only when somebody asks for more: a module beside the page.
 await build({
     entryPoints: [here('src/extras.ts')], bundle: true, minify: true, format: 'esm', target: 'es2022', charset: 'utf8', legalComments: 'none',
-    outfile: pagePath.replace(/[^/]*$/, 'extras.js'),
+    outfile: beside('extras.js'),
 });
 
 await mkdir(dirname(pagePath), { recursive: true });
 await writeFile(pagePath, page);
+await writeFile(beside('decoder.txt'), textOfBytes(await readFile(wasmPath)));
+await writeFile(beside('rasters.txt'), textOfBytes(await readFile(rastersPath)));

@@ -1,4 +1,4 @@
-// The wasm decoder in node: the same meshes as the native one, and no input that traps it.
+// The wasm decoders in node, of every model and of rasters alone: the same meshes as the native one, and no input that traps them.
 // LATHE_HASH_STREAM=FILE with LATHE_HASH_EXPECT=FILE (lines as `lathe hash --each` prints them) checks another stream.
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
@@ -12,8 +12,11 @@ import { program, serve, withFolder, writeLabels } from './browser.mjs';
 process.chdir(fileURLToPath(new URL('..', import.meta.url)));
 const run = promisify(execFile);
 
-const module = await WebAssembly.compile(await readFile(process.env.LATHE_WASM ?? '../build/wasm/lathe.wasm'));
-const open = async () => (await WebAssembly.instantiate(module)).exports;
+const load = async (path) => WebAssembly.compile(await readFile(path));
+const modules = process.env.LATHE_WASM
+    ? { given: await load(process.env.LATHE_WASM) }
+    : { whole: await load('../build/wasm/lathe.wasm'), rasters: await load('../build/wasm/rasters.wasm') };
+const open = async (module) => (await WebAssembly.instantiate(module)).exports;
 
 function feed(wasm, bytes) {
     const address = wasm.input(bytes.length);
@@ -45,84 +48,99 @@ before(() => withFolder(async (folder) => {
     await server.stop();
 }));
 
-test('nothing is imported', () => assert.deepEqual(WebAssembly.Module.imports(module), []));
+for (const [name, module] of Object.entries(modules)) {
+    test(name + ': nothing is imported', () => assert.deepEqual(WebAssembly.Module.imports(module), []));
 
-test('the same meshes as the native decoder, whatever the portions', async () => {
-    for (const size of [1, 7, 100, stream.length]) {
-        const wasm = await open();
-        for (let at = 0; at < stream.length; at += size) {
-            assert.equal(feed(wasm, stream.subarray(at, at + size)), 0);
-            assert.equal(stepAll(wasm), 1);
-        }
-        assert.deepEqual(hashes(wasm), expected);
-    }
-});
-
-test('another stream, if one is given', { skip: !process.env.LATHE_HASH_STREAM }, async () => {
-    const wasm = await open();
-    assert.equal(feed(wasm, await readFile(process.env.LATHE_HASH_STREAM)), 0);
-    assert.equal(stepAll(wasm), 1);
-    assert.deepEqual(hashes(wasm), (await readFile(process.env.LATHE_HASH_EXPECT, 'utf8')).trim().split(/\s+/));
-});
-
-test('meshes for the GPU: closed, unit normals, openness between 0 and 1', async () => {
-    const wasm = await open();
-    feed(wasm, stream);
-    stepAll(wasm, (structure) => {
-        assert.equal(wasm.mesh(structure), 0);
-        const [, , , , , , , vertices, triangles, start] = new Uint32Array(wasm.memory.buffer, wasm.report_words(), 10);
-        const memory = wasm.memory.buffer;
-        const positions = new Float32Array(memory, start, 3 * vertices);
-        const shading = new Int16Array(memory, start + 12 * vertices, 4 * vertices);
-        const indices = new Uint32Array(memory, start + 20 * vertices, 3 * triangles);
-        assert.ok(positions.every(Number.isFinite));
-        const edges = new Set();
-        for (let i = 0; i < indices.length; i++)
-            edges.add(indices[i] * vertices + indices[i % 3 === 2 ? i - 2 : i + 1]);
-        assert.equal(edges.size, indices.length);
-        for (const edge of edges) assert.ok(edges.has((edge % vertices) * vertices + Math.floor(edge / vertices)));
-        for (let v = 0; v < vertices; v++) {
-            const length = Math.hypot(...shading.subarray(4 * v, 4 * v + 3)) / 32767;
-            assert.ok(Math.abs(length - 1) < 1e-3 || length === 0);
-            assert.ok(shading[4 * v + 3] >= 0);
+    test(name + ': the same meshes as the native decoder, whatever the portions', async () => {
+        for (const size of [1, 7, 100, stream.length]) {
+            const wasm = await open(module);
+            for (let at = 0; at < stream.length; at += size) {
+                assert.equal(feed(wasm, stream.subarray(at, at + size)), 0);
+                assert.equal(stepAll(wasm), 1);
+            }
+            assert.deepEqual(hashes(wasm), expected);
         }
     });
-});
 
-test('the normals of a ball point outwards', async () => {
-    const wasm = await open();
-    feed(wasm, stream);
-    stepAll(wasm);
-    wasm.mesh(0);
-    const [, , , , , , , vertices, , start] = new Uint32Array(wasm.memory.buffer, wasm.report_words(), 10);
-    const positions = new Float32Array(wasm.memory.buffer, start, 3 * vertices);
-    const shading = new Int16Array(wasm.memory.buffer, start + 12 * vertices, 4 * vertices);
-    const centre = [12, 24, 24 * 1.2];
-    for (let v = 0; v < vertices; v++) {
-        const dot = centre.reduce((sum, c, i) => sum + (positions[3 * v + i] - c) * shading[4 * v + i], 0);
-        assert.ok(dot > 0);
-    }
-});
-
-test('every prefix waits for more; every flipped byte is refused or decoded, never a trap', async () => {
-    for (let size = 0; size < stream.length; size++) {
-        const wasm = await open();
-        if (size) feed(wasm, stream.subarray(0, size));
+    test(name + ': another stream, if one is given', { skip: !process.env.LATHE_HASH_STREAM }, async () => {
+        const wasm = await open(module);
+        assert.equal(feed(wasm, await readFile(process.env.LATHE_HASH_STREAM)), 0);
         assert.equal(stepAll(wasm), 1);
-    }
-    for (let at = 0; at < stream.length; at++) {
-        const wasm = await open(), damaged = stream.slice();
-        damaged[at] ^= 1 << at % 8;
-        if (feed(wasm, damaged) === 0) stepAll(wasm, (structure) => wasm.mesh(structure));
-    }
-});
+        assert.deepEqual(hashes(wasm), (await readFile(process.env.LATHE_HASH_EXPECT, 'utf8')).trim().split(/\s+/));
+    });
 
-test('memory is used again: a second mesh of the same structure needs no more', async () => {
-    const wasm = await open();
-    feed(wasm, stream);
-    stepAll(wasm);
-    for (let i = 0; i < 3; i++) wasm.mesh(1);
-    const size = wasm.memory.buffer.byteLength;
-    for (let i = 0; i < 200; i++) assert.equal(wasm.mesh(i % 2), 0);
-    assert.equal(wasm.memory.buffer.byteLength, size);
+    test(name + ': meshes for the GPU: closed, unit normals, openness between 0 and 1', async () => {
+        const wasm = await open(module);
+        feed(wasm, stream);
+        stepAll(wasm, (structure) => {
+            assert.equal(wasm.mesh(structure), 0);
+            const [, , , , , , , vertices, triangles, start] = new Uint32Array(wasm.memory.buffer, wasm.report_words(), 10);
+            const memory = wasm.memory.buffer;
+            const positions = new Float32Array(memory, start, 3 * vertices);
+            const shading = new Int16Array(memory, start + 12 * vertices, 4 * vertices);
+            const indices = new Uint32Array(memory, start + 20 * vertices, 3 * triangles);
+            assert.ok(positions.every(Number.isFinite));
+            const edges = new Set();
+            for (let i = 0; i < indices.length; i++)
+                edges.add(indices[i] * vertices + indices[i % 3 === 2 ? i - 2 : i + 1]);
+            assert.equal(edges.size, indices.length);
+            for (const edge of edges) assert.ok(edges.has((edge % vertices) * vertices + Math.floor(edge / vertices)));
+            for (let v = 0; v < vertices; v++) {
+                const length = Math.hypot(...shading.subarray(4 * v, 4 * v + 3)) / 32767;
+                assert.ok(Math.abs(length - 1) < 1e-3 || length === 0);
+                assert.ok(shading[4 * v + 3] >= 0);
+            }
+        });
+    });
+
+    test(name + ': the normals of a ball point outwards', async () => {
+        const wasm = await open(module);
+        feed(wasm, stream);
+        stepAll(wasm);
+        wasm.mesh(0);
+        const [, , , , , , , vertices, , start] = new Uint32Array(wasm.memory.buffer, wasm.report_words(), 10);
+        const positions = new Float32Array(wasm.memory.buffer, start, 3 * vertices);
+        const shading = new Int16Array(wasm.memory.buffer, start + 12 * vertices, 4 * vertices);
+        const centre = [12, 24, 24 * 1.2];
+        for (let v = 0; v < vertices; v++) {
+            const dot = centre.reduce((sum, c, i) => sum + (positions[3 * v + i] - c) * shading[4 * v + i], 0);
+            assert.ok(dot > 0);
+        }
+    });
+
+    test(name + ': every prefix waits for more; every flipped byte is refused or decoded, never a trap', async () => {
+        for (let size = 0; size < stream.length; size++) {
+            const wasm = await open(module);
+            if (size) feed(wasm, stream.subarray(0, size));
+            assert.equal(stepAll(wasm), 1);
+        }
+        for (let at = 0; at < stream.length; at++) {
+            const wasm = await open(module), damaged = stream.slice();
+            damaged[at] ^= 1 << at % 8;
+            if (feed(wasm, damaged) === 0) stepAll(wasm, (structure) => wasm.mesh(structure));
+        }
+    });
+
+    test(name + ': memory is used again: a second mesh of the same structure needs no more', async () => {
+        const wasm = await open(module);
+        feed(wasm, stream);
+        stepAll(wasm);
+        for (let i = 0; i < 3; i++) wasm.mesh(1);
+        const size = wasm.memory.buffer.byteLength;
+        for (let i = 0; i < 200; i++) assert.equal(wasm.mesh(i % 2), 0);
+        assert.equal(wasm.memory.buffer.byteLength, size);
+    });
+}
+
+test('the decoder of rasters refuses other models with words', { skip: !modules.rasters }, async () => {
+    for (const golden of ['radius', 'keep', 'exact']) {
+        const wasm = await open(modules.rasters);
+        assert.equal(feed(wasm, await readFile(`../tests/golden/${golden}.lathe`)), 0);
+        assert.ok(wasm.step() < 0);
+        const text = new Uint8Array(wasm.memory.buffer, wasm.error_text(), 80);
+        assert.match(new TextDecoder().decode(text.slice(0, text.indexOf(0))), /not made of rasters/);
+        const whole = await open(modules.whole);
+        assert.equal(feed(whole, await readFile(`../tests/golden/${golden}.lathe`)), 0);
+        assert.equal(whole.step(), 0);
+    }
 });
