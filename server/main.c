@@ -1,6 +1,9 @@
 /* lathe: scanned volumes as surfaces that refine while they arrive. The commands are in cmd_*.c. */
 #include "cli.h"
 #include <fcntl.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 #include <signal.h>
 #include <string.h>
 #include <unistd.h>
@@ -31,6 +34,15 @@ static void occupy_standard_files(void) {
         }
 }
 
+/* Whoever decodes one model after the other gets the same memory each time: fresh pages, which the kernel has to clear, took a tenth of
+ * the time that decoding takes. */
+static void keep_memory(void) {
+#ifdef __GLIBC__
+    mallopt(M_MMAP_THRESHOLD, 32 << 20);
+    mallopt(M_TRIM_THRESHOLD, 64 << 20);
+#endif
+}
+
 static int run_command(int argc, char **argv) {
     if (argc < 2) {
         print_help(stderr);
@@ -53,6 +65,7 @@ static int run_command(int argc, char **argv) {
 
 int main(int argc, char **argv) {
     occupy_standard_files();
+    keep_memory();
     signal(SIGPIPE, SIG_IGN);      /* a closed pipe is an error that each writer sees */
     return lathe__finish_output(run_command(argc, argv));
 }
