@@ -24,6 +24,7 @@ typedef struct bake {
     lathe_structure_state *states;
     lathe_pyramid pyramid;     /* unless levels are of slices */
     lathe_packet_list packets[LATHE_MAX_LEVELS];
+    lathe_reference *reference; /* of the structure, once planning has asked for it and errors will */
     double done, total;        /* voxels, for progress */
     lathe_error *err;
 } bake;
@@ -58,12 +59,43 @@ static float value_at(const bake *b, const int32_t frame[3], int32_t u, int32_t 
 }
 
 /* What the encoder asks: positions are of the mask's frame. */
-typedef struct grey_values { const bake *bake; const lathe_mask *mask; int32_t frame[3]; } grey_values;
+typedef struct grey_values { bake *bake; const lathe_mask *mask; int32_t frame[3]; } grey_values;
 
 static double grey_value(const void *context, int32_t u, int32_t v, int32_t w) {
     const grey_values *g = context;
     const int32_t *o = g->mask->origin;
     return (double)value_at(g->bake, g->frame, o[0] + u, o[1] + v, o[2] + w);
+}
+
+static void grey_square(const void *context, int32_t u, int32_t v, int32_t w, float out[4]) {
+    const grey_values *g = context;
+    const lathe_volume *volume = g->bake->volume;
+    const int32_t *frame = g->frame, *o = g->mask->origin, *dims = volume->dims;
+    int32_t at[3] = {o[0] + u, o[1] + v, o[2] + w};
+    bool within = true;
+    for (int k = 0; k < 3; k++) within &= at[k] >= 0 && at[k] + (k < 2) < dims[frame[k]];
+    if (within) {
+        size_t step[3] = {1, (size_t)dims[0], (size_t)dims[0] * (size_t)dims[1]}, du = step[frame[0]], dv = step[frame[1]];
+        const float *p = volume->values + (size_t)at[0] * du + (size_t)at[1] * dv + (size_t)at[2] * step[frame[2]];
+        out[0] = p[0], out[1] = p[du], out[2] = p[dv], out[3] = p[du + dv];
+        return;
+    }
+    for (int k = 0; k < 4; k++) out[k] = value_at(g->bake, frame, at[0] + (k & 1), at[1] + (k >> 1), at[2]);
+}
+
+/* Planning borrows what errors need: where they are wanted, it is a stage of its own. */
+static lathe_status grey_reference(const void *context, const lathe_reference **out) {
+    const grey_values *g = context;
+    bake *b = g->bake;
+    const lathe_bake_options *o = b->options;
+    if (!b->reference) {
+        lathe_status status = o->measure ? tell(b, "planning", 0.2) : LATHE_OK;
+        if (!status) status = lathe__reference_build(&b->reference, b->volume, o->axis, g->mask, b->boundary, o->iso);
+        if (!status && o->measure) status = tell(b, "reference surface", 0.2);
+        if (status) return status;
+    }
+    *out = b->reference;
+    return LATHE_OK;
 }
 
 static double voxel_mm3(const lathe_volume *volume) {
@@ -72,13 +104,14 @@ static double voxel_mm3(const lathe_volume *volume) {
                 m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]));
 }
 
-static lathe_encode_source source_of(const bake *b, grey_values *grey, const lathe_mask *mask) {
+static lathe_encode_source source_of(bake *b, grey_values *grey, const lathe_mask *mask) {
     *grey = (grey_values){.bake = b, .mask = mask};
     lathe__axis_frame(b->options->axis, grey->frame);
     const double *spacing = b->volume->spacing;
     double slice = spacing[grey->frame[2]];
     return (lathe_encode_source){.slice_ratio = slice * slice / (spacing[grey->frame[0]] * spacing[grey->frame[1]]),
-                                 .value = grey_value, .context = grey, .iso = b->options->iso};
+                                 .value = grey_value, .square = grey_square, .reference = b->count == 1 ? grey_reference : NULL,
+                                 .context = grey, .iso = b->options->iso};
 }
 
 /* Where the grey values cross iso on border edges, on average: one number for the whole structure. Rows and columns of every few
@@ -141,11 +174,12 @@ static lathe_status draco_size(uint64_t *out, const lathe_mesh *mesh, const lath
 /* Builds each level's mesh as a decoder will, counts and measures it. */
 static lathe_status finish_levels(bake *b, lathe_structure_state *state, lathe_baked_structure *baked, double voxels) {
     const lathe_bake_options *o = b->options;
-    lathe_reference *reference = NULL;
+    lathe_reference *reference = b->reference;
     lathe_transform transform = lathe__mask_transform(&state->mask, o->axis, b->volume->affine);
     lathe_status status = LATHE_OK;
     size_t samples = o->measure ? sample_count(b, &state->mask) : 0;
-    if (o->measure) status = lathe__reference_build(&reference, b->volume, o->axis, &state->mask, b->boundary, o->iso);
+    b->reference = NULL;
+    if (o->measure && !reference) status = lathe__reference_build(&reference, b->volume, o->axis, &state->mask, b->boundary, o->iso);
     for (uint32_t level = 0; !status && level < baked->level_count; level++) {
         lathe_level_info *info = &baked->levels[level];
         lathe_surface_counts counts;
@@ -229,7 +263,7 @@ static void schedule(bake *b) {
 
 static lathe_status plan_pyramid(bake *b) {
     lathe_status status = LATHE_OK;
-    b->header.parameters[1] |= LATHE_FLAG_PYRAMID;
+    b->header.parameters[1] |= LATHE_FLAG_PYRAMID | LATHE_FLAG_SURE;
     schedule(b);
     for (size_t i = 0; i < b->count; i++) b->header.structures[i].level_count = (uint8_t)(b->header.parameter_count - 1);
     status = lathe__pyramid_read(&b->pyramid, &b->header);
@@ -261,7 +295,7 @@ static lathe_status plan_radii(bake *b) {
         return explain(b, 0, "planning", status);
     }
     state->pyramid = NULL;
-    state->flags = b->header.parameters[1] &= ~(uint32_t)LATHE_FLAG_PYRAMID;
+    state->flags = b->header.parameters[1] &= ~(uint32_t)(LATHE_FLAG_PYRAMID | LATHE_FLAG_SURE);
     b->header.parameter_count = b->header.parameters[1] ? 2 : 1;
     b->header.structures[0].level_count = (uint8_t)baked->level_count;
     return LATHE_OK;
@@ -277,7 +311,8 @@ static lathe_status plan(bake *b) {
         if (!status) status = tell(b, "planning", 0.2 * (double)(i + 1) / (double)b->count);
     }
     if (!status && !slices) status = plan_pyramid(b);
-    return status || slices || o->structure_count || o->exact || o->levels ? status : plan_radii(b);
+    if (!status && !slices && !o->structure_count && !o->exact && !o->levels) status = plan_radii(b);
+    return status ? status : tell(b, "planning", 0.2);
 }
 
 static lathe_status encode_structure(bake *b, size_t index, uint32_t level) {
@@ -440,7 +475,8 @@ lathe_status lathe_bake(const lathe_volume *volume, const lathe_bake_options *op
                         lathe_error *err) {
     bake b = {.volume = volume, .options = options, .err = err};
     if (err) err->text[0] = '\0';
-    lathe_status status = prepare(&b);
+    lathe_status status = tell(&b, "reading", 0);
+    if (!status) status = prepare(&b);
     if (!status) status = bake_structures(&b);
     if (!status) status = tell(&b, "writing", 1);
     if (!status) status = write_archive(&b, sink, context);
@@ -448,6 +484,7 @@ lathe_status lathe_bake(const lathe_volume *volume, const lathe_bake_options *op
     for (int i = 0; i < LATHE_MAX_LEVELS; i++) lathe__packets_free(&b.packets[i]);
     for (size_t i = 0; b.baked && i < b.count; i++) lathe__baked_free(&b.baked[i]);
     for (size_t i = 0; b.states && i < b.count; i++) lathe__state_free(&b.states[i]);
+    lathe__reference_free(&b.reference);
     free(b.states);
     free(b.baked);
     free(b.header.structures);

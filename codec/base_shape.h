@@ -28,9 +28,9 @@ enum { LATHE_NUMBER_MODELS = 48 };
 typedef struct lathe_number_model { lathe_bit_model bit[LATHE_NUMBER_MODELS]; } lathe_number_model;
 static inline void lathe__bit_learn(lathe_bit_model *m, int bit) {
     /* Fast at first, then 1/32: small structures have few symbols. */
-    int32_t rate = m->count < 30 ? m->count + 2 : 32;
-    if (m->count < 30) m->count++;
-    int32_t p = m->p1 + (bit ? 65535 - m->p1 : -(int32_t)m->p1) / rate;
+    int32_t p = m->p1, away = bit ? 65535 - p : p, move = away >> 5;
+    if (m->count < 30) move = away / (m->count++ + 2);
+    p = bit ? p + move : p - move;
     m->p1 = (uint16_t)(p < 512 ? 512 : p > 65023 ? 65023 : p);
 }
 /* A number of under 2^20 in magnitude: is it 0; its sign; the length of its magnitude in unary; its lower bits. */

@@ -67,32 +67,37 @@ lathe_status lathe__pyramid_spread(lathe_mask *out, const lathe_mask *coarse, co
     return LATHE_OK;
 }
 
-/* Bit i of word k and bit k of word i change places. */
-static void transpose(uint64_t m[64]) {
-    uint64_t mask = UINT64_C(0x00000000ffffffff);
-    for (int j = 32; j; j >>= 1, mask ^= mask << j)
-        for (int k = 0; k < 64; k = ((k | j) + 1) & ~j) {
-            uint64_t t = (m[k] >> j ^ m[k | j]) & mask;
-            m[k] ^= t << j;
-            m[k | j] ^= t;
-        }
+/* Bit i of word k and bit k of word i change places, for all below n, a power of two. Blocks of j x j do, half their size each time. */
+static void transpose(uint64_t m[64], int n) {
+    uint64_t mask = ~UINT64_C(0) >> (64 - n);
+    for (int j = n / 2; j; j /= 2) {
+        mask ^= mask << j;
+        for (uint64_t *block = m; block < m + n; block += 2 * j)
+            for (uint64_t *at = block; at < block + j; at++) {
+                uint64_t t = (*at >> j ^ at[j]) & mask;
+                *at ^= t << j;
+                at[j] ^= t;
+            }
+    }
 }
 
-/* Columns of one slice as rows of planes, or back: blocks of 64 x 64 bits. */
+/* Columns of one slice as rows of planes, or back: blocks of up to 64 x 64 bits. */
 static void turn_slice(const lathe_mask *raster, const lathe_mask *planes, int32_t w, bool back) {
+    int32_t row_words = raster->row_words, plane_words = (int32_t)lathe__mask_slice_words(planes);
     for (int32_t bv = 0; bv < raster->size[1]; bv += 64)
         for (int32_t bu = 0; bu < raster->size[0]; bu += 64) {
-            uint64_t m[64] = {0};
+            uint64_t m[64] = {0}, any = 0;
+            uint64_t *row = row_of(raster, bv, w) + (bu >> 6), *column = row_of(planes, w + 1, bu) + (bv >> 6);
             int32_t nv = raster->size[1] - bv < 64 ? raster->size[1] - bv : 64, nu = raster->size[0] - bu < 64 ? raster->size[0] - bu : 64;
-            if (back) {
-                for (int32_t k = 0; k < nu; k++) m[k] = row_of(planes, w + 1, bu + k)[bv >> 6];
-                transpose(m);
-                for (int32_t k = 0; k < nv; k++) row_of(raster, bv + k, w)[bu >> 6] = m[k];
-            } else {
-                for (int32_t k = 0; k < nv; k++) m[k] = row_of(raster, bv + k, w)[bu >> 6];
-                transpose(m);
-                for (int32_t k = 0; k < nu; k++) row_of(planes, w + 1, bu + k)[bv >> 6] = m[k];
-            }
+            const uint64_t *from = back ? column : row;
+            uint64_t *to = back ? row : column;
+            int32_t from_step = back ? plane_words : row_words, to_step = back ? row_words : plane_words;
+            int32_t from_count = back ? nu : nv, to_count = back ? nv : nu, n = 64;
+            for (int32_t k = 0; k < from_count; k++) any |= m[k] = from[(size_t)k * (size_t)from_step];
+            if (!any) continue;   /* the target is empty, too */
+            while (n > 1 && nu <= n / 2 && nv <= n / 2) n /= 2;
+            transpose(m, n);
+            for (int32_t k = 0; k < to_count; k++) to[(size_t)k * (size_t)to_step] = m[k];
         }
 }
 

@@ -116,13 +116,13 @@ void lathe__pyramid_plan(lathe_header *header, const double spacing[3], const in
     }
 }
 
-lathe_status lathe__pyramid_cost(size_t *bytes, const lathe_mask *mask, const double spacing[3]) {
+lathe_status lathe__pyramid_cost(size_t *bytes, const lathe_mask *mask, const double spacing[3], size_t enough) {
     lathe_header_structure structure = {.level_count = 0};
     lathe_header header = {.structure_count = 1, .structures = &structure};
     int32_t most[3] = {mask->size[0] - 2, mask->size[1] - 2, mask->size[2]};
     lathe_pyramid pyramid;
     lathe_models models = {.widest = {3, 3}};
-    lathe_structure_state state = {.mask = *mask, .pyramid = &pyramid};
+    lathe_structure_state state = {.mask = *mask, .pyramid = &pyramid, .flags = LATHE_FLAG_SURE};
     lathe__pyramid_plan(&header, spacing, most, 0);
     structure.level_count = (uint8_t)(header.parameter_count - 1);
     lathe_status status = lathe__pyramid_read(&pyramid, &header);
@@ -130,7 +130,7 @@ lathe_status lathe__pyramid_cost(size_t *bytes, const lathe_mask *mask, const do
     lathe_bytes all = {0};
     lathe__encoder_start(&e);
     for (uint32_t level = 0; !status && level < pyramid.level_count; level++)
-        for (uint32_t pass = 0; !status && pass < lathe__pyramid_passes(&pyramid, level); pass++)
+        for (uint32_t pass = 0; !status && e.size < enough && pass < lathe__pyramid_passes(&pyramid, level); pass++)
             status = lathe__pass_encode(&e, &state, &models, level, pass);
     lathe_status coded = lathe__append_coded(&all, &e);
     *bytes = all.size;

@@ -24,18 +24,19 @@ static const double MOST_BACK = 0.05;
 static double between_pixels(void *context, double u, double v, int32_t w) {
     const lathe_encode_source *s = context;
     int32_t i = (int32_t)floor(u), j = (int32_t)floor(v);
-    double fu = u - i, fv = v - j, low = 0, high = 0;
-    low = s->value(s->context, i, j, w) * (1 - fu) + s->value(s->context, i + 1, j, w) * fu;
-    high = s->value(s->context, i, j + 1, w) * (1 - fu) + s->value(s->context, i + 1, j + 1, w) * fu;
-    return low * (1 - fv) + high * fv;
+    double fu = u - i, fv = v - j;
+    float at[4];
+    if (s->square) s->square(s->context, i, j, w, at);
+    else for (int32_t k = 0; k < 4; k++) at[k] = (float)s->value(s->context, i + (k & 1), j + (k >> 1), w);
+    return ((double)at[0] * (1 - fu) + (double)at[1] * fu) * (1 - fv) + ((double)at[2] * (1 - fu) + (double)at[3] * fu) * fv;
 }
 
 /* ---- how much the shape turns from slice to slice ---- */
 
 static double likeness(const lathe_radius_map *map, int32_t apart, int32_t shift) {
     double sum = 0;
-    int32_t every = map->slices / 48 + 1;
-    for (int32_t row = 0; row + apart < map->slices; row += every) {
+    int32_t every = map->slices / 16 + 1, rows = 0;
+    for (int32_t row = 0; row + apart < map->slices; row += every, rows++) {
         const int32_t *a = map->radius + (size_t)row * map->rays, *b = a + (size_t)apart * map->rays;
         double ab = 0, aa = 0, bb = 0, mean_a = 0, mean_b = 0;
         for (uint32_t i = 0; i < map->rays; i++) mean_a += a[i], mean_b += b[i];
@@ -46,12 +47,14 @@ static double likeness(const lathe_radius_map *map, int32_t apart, int32_t shift
         }
         if (aa > 0 && bb > 0) sum += ab / sqrt(aa * bb);
     }
-    return sum / (map->slices - apart);
+    return sum / rows;
 }
 
-/* Profiles farther and farther apart are laid over each other; each distance refines what the one before said. */
+/* Profiles farther and farther apart are laid over each other; each distance refines what the one before said. What is hardly more
+ * alike when turned is straight. */
 static int32_t estimate_turn(const lathe_radius_map *map) {
-    double turn = 0;           /* in rays for each slice */
+    static const double CLEARLY = 0.1;
+    double turn = 0, gain = 0; /* turn: in rays for each slice */
     for (int32_t apart = 1; apart <= 16 && apart < map->slices; apart *= 2) {
         int32_t around = (int32_t)lround(turn * apart), reach = apart == 1 ? (int32_t)map->rays / 16 : 2, best = around;
         double most = -2;
@@ -60,16 +63,19 @@ static int32_t estimate_turn(const lathe_radius_map *map) {
             if (l > most + 1e-9) most = l, best = shift;
         }
         turn = (double)best / apart;
+        if (2 * apart > 16 || 2 * apart >= map->slices) gain = best ? most - likeness(map, apart, 0) : 0;
     }
-    return (int32_t)lround(turn * 65536 / map->rays);
+    return gain > CLEARLY ? (int32_t)lround(turn * 65536 / map->rays) : 0;
 }
 
 /* ---- trying ---- */
 
+enum { FINEST_STEP = 10, FINE_STEP = 20, COARSE_STEP = 52 };
+
 typedef struct trial {
     lathe_radii truth;
     lathe_radius_estimate estimate;
-    lathe_reference *reference;
+    const lathe_reference *reference;
     lathe_arena *arena;        /* three: of a trial's maps, and two for scratch */
     double pixel, voxel;       /* pixel: in voxels; voxel: the smallest of its edges, mm */
     size_t borders, samples;   /* border edges of the mask; points of a measurement */
@@ -79,12 +85,17 @@ typedef struct trial {
 
 typedef struct outcome {
     lathe_radii coded;         /* until the next trial; at any level */
-    size_t bytes[LATHE_MAX_LEVELS];
-    double rms[LATHE_MAX_LEVELS], most[LATHE_MAX_LEVELS];   /* voxels */
+    double rms[LATHE_MAX_LEVELS], most[LATHE_MAX_LEVELS];   /* voxels; by the estimate */
 } outcome;
 
 static int32_t put_number(void *coder, lathe_number_model *model, int32_t number) {
     lathe__put_number(coder, model, number);
+    return number;
+}
+
+/* What a decoder would have, without its bytes. */
+static int32_t keep_number(void *coder, lathe_number_model *model, int32_t number) {
+    (void)coder, (void)model;
     return number;
 }
 
@@ -98,85 +109,152 @@ static lathe_radii frame_of(const trial *t) {
     return (lathe_radii){.slices = t->truth.slices, .width = t->truth.width, .height = t->truth.height, .level_count = t->truth.level_count};
 }
 
-/* Codes levels up to `last`; errors are estimated from level `from` on. */
+/* A number out of range: no such maps. */
+static lathe_status no_map(lathe_status status) { return status == LATHE_ERR_FORMAT ? LATHE_ERR_EMPTY : status; }
+
+/* Takes levels up to `last` over; errors are estimated from level `from` on. */
 static lathe_status try_steps(outcome *out, trial *t, uint32_t from, uint32_t last) {
     lathe_status status = LATHE_OK;
     lathe__arena_reset(&t->arena[0]);
     out->coded = frame_of(t);
     for (uint32_t level = 0; !status && level <= last; level++) {
-        lathe_range_encoder e;
-        lathe__encoder_start(&e);
-        status = lathe__radii_code(&out->coded, &t->truth, &t->arena[0], level, put_number, &e);
-        lathe__encoder_finish(&e);
-        out->bytes[level] = e.size;
-        if (!status && e.failed) status = LATHE_ERR_MEMORY;
-        lathe__encoder_free(&e);
+        status = lathe__radii_code(&out->coded, &t->truth, &t->arena[0], level, keep_number, NULL);
+        for (uint32_t i = 0; !status && !level && i < out->coded.count; i++) out->coded.tubes[i].map.left = NULL;
         if (status || level < from) continue;
         status = lathe__estimate_error(&out->rms[level], &out->most[level], &t->estimate, &t->arena[1], &out->coded, level);
         out->rms[level] *= t->pixel;
         out->most[level] *= t->pixel;
     }
-    return status == LATHE_ERR_FORMAT ? LATHE_ERR_EMPTY : status;   /* a number out of range */
+    return no_map(status);
 }
 
-enum { FINEST_STEP = 10, FINE_STEP = 20, COARSE_STEP = 52 };
+/* Codes a level behind the ones before it; its bytes are added. */
+static lathe_status add_bytes(size_t *bytes, lathe_radii *coded, trial *t, uint32_t level) {
+    lathe_range_encoder e;
+    lathe__encoder_start(&e);
+    lathe_status status = lathe__radii_code(coded, &t->truth, &t->arena[0], level, put_number, &e);
+    lathe__encoder_finish(&e);
+    *bytes += e.size;
+    if (!status && e.failed) status = LATHE_ERR_MEMORY;
+    lathe__encoder_free(&e);
+    return no_map(status);
+}
+
+/* Of levels up to one, without what stands around them. */
+static lathe_status count_bytes(size_t *bytes, trial *t, uint32_t level) {
+    lathe_radii coded = frame_of(t);
+    lathe_status status = LATHE_OK;
+    lathe__arena_reset(&t->arena[0]);
+    *bytes = 0;
+    for (uint32_t i = 0; !status && i <= level; i++) status = add_bytes(bytes, &coded, t, i);
+    return status;
+}
+
+/* An estimate with what it leaves out; that is never taken for more than makes up for half of it. */
+static double corrected(double rms, double apart) { return sqrt(fmax(rms * rms + apart, 0.25 * rms * rms)); }
 
 static double expected(const trial *t, const outcome *o, uint32_t level, uint32_t measured) {
-    return sqrt(fmax(o->rms[level] * o->rms[level] + t->apart[measured], 0.25 * o->rms[level] * o->rms[level]));
+    return corrected(o->rms[level], t->apart[measured]);
 }
 
 /* What the estimate leaves out are caps and joints, and that it looks along rays: measured once, it is known for other steps, too. */
-static lathe_status measure(bool *close, outcome *o, trial *t, uint32_t level) {
+static lathe_status measure(bool *close, const outcome *o, trial *t, uint32_t level, size_t samples) {
     lathe_mesh mesh = {0};
     lathe_surface_counts counts = {0};
-    lathe_metrics m;
+    double rms;
+    bool within;
     uint32_t shown;
-    lathe_status status = lathe__radii_mesh(&mesh, &t->arena[1], &o->coded, level, &counts, &shown);
-    if (!status) status = lathe__reference_measure(&m, t->reference, &mesh, t->samples);
+    lathe_radii coded = o->coded;
+    lathe_status status = lathe__radii_mesh(&mesh, &t->arena[1], &coded, level, &counts, &shown);
+    if (!status) status = lathe__reference_within(&within, &rms, t->reference, &mesh, samples, CLOSE_MAX * t->voxel);
     lathe_mesh_free(&mesh);
     if (status) return status;
-    double rms = m.rms_mm / t->voxel;
+    rms /= t->voxel;
     t->apart[level] = rms * rms - o->rms[level] * o->rms[level];
-    *close = rms <= CLOSE_RMS && m.max_mm <= CLOSE_MAX * t->voxel;
+    *close = rms <= CLOSE_RMS && within;
     return LATHE_OK;
 }
 
-/* The coarsest step between two, the first of which is close enough, that leaves a level close: found by the estimate, which is measured
- * where the search ends; a step that the measurement refuses makes way for finer ones. */
-static lathe_status search_step(int32_t *good, trial *t, uint32_t level, int32_t bad, double first) {
+/* ---- the step that a level has ---- */
+
+/* Steps of one level; each is tried once. */
+typedef struct search {
+    trial *t;
+    uint32_t level;
+    double rms[COARSE_STEP];   /* by the estimate; 0: not known yet */
+    int32_t in_hand;           /* the step that `o` is of */
+    outcome o;
+} search;
+
+static lathe_status try_step(search *s, int32_t step) {
+    set_steps(&s->t->truth, step, 0, 0);
+    lathe_status status = try_steps(&s->o, s->t, s->level, s->level);
+    s->rms[step] = s->o.rms[s->level];
+    s->in_hand = step;
+    return status;
+}
+
+static double expected_of(const search *s, int32_t step) { return corrected(s->rms[step], s->t->apart[s->level]); }
+
+/* Between two steps, the lower of which is good: where a line through the logarithms of their estimates meets the limit. Errors grow a
+ * little slower than steps, eight of which double them. */
+static int32_t next_guess(const search *s, int32_t low, int32_t high) {
+    const double limit2 = CLOSE_RMS * CLOSE_RMS;
+    double limit = sqrt(fmin(limit2 - s->t->apart[s->level], 4 * limit2)), slope = 0.1;   /* see corrected */
+    double below = fmax(0, log2(limit / s->rms[low]));
+    if (high < COARSE_STEP && s->rms[high] > 0) slope = fmax(1e-3, (below + log2(s->rms[high] / limit)) / (high - low));
+    int32_t guess = low + (int32_t)lround(fmin(below / slope, high - low));
+    return guess <= low ? low + 1 : guess >= high ? high - 1 : guess;
+}
+
+/* The coarsest step above `good` that is expected to leave the level close, below `bad`, which does not; or `good`. */
+static lathe_status guess_step(int32_t *step, search *s, int32_t good, int32_t bad) {
+    int32_t low = good, high = bad;
+    for (int32_t i = good + 1; i < high; i++) {
+        if (s->rms[i] <= 0) continue;
+        if (expected_of(s, i) <= CLOSE_RMS) low = i;
+        else high = i;
+    }
+    while (high - low > 1) {
+        int32_t guess = next_guess(s, low, high);
+        lathe_status status = try_step(s, guess);
+        if (status) return status;
+        *(expected_of(s, guess) <= CLOSE_RMS ? &low : &high) = guess;
+    }
+    *step = low;
+    return LATHE_OK;
+}
+
+static lathe_status measure_step(bool *close, search *s, int32_t step) {
+    lathe_status status = s->in_hand == step ? LATHE_OK : try_step(s, step);
+    return status ? status : measure(close, &s->o, s->t, s->level, s->t->samples);
+}
+
+/* The coarsest step that leaves the level close, by measurement of where the search ends; a step that it refuses makes way for finer
+ * ones. *good: the finest step, and whether that has been measured. */
+static lathe_status search_step(int32_t *good, bool *sure, search *s, int32_t bad) {
     enum { MEASUREMENTS = 2 };
     static const double NEAR = 0.97;
-    outcome o;
     for (int count = 0; bad - *good > 1 && count < MEASUREMENTS; count++) {
-        /* Errors grow a little slower than steps. */
-        int32_t low = *good, high = bad, guess = low + (int32_t)lround(10 * log2(CLOSE_RMS / fmin(CLOSE_RMS, first)));
-        for (; high - low > 1; guess = (low + high) / 2) {
-            guess = guess <= low ? low + 1 : guess >= high ? high - 1 : guess;
-            set_steps(&t->truth, guess, 0, 0);
-            lathe_status status = try_steps(&o, t, level, level);
-            if (status) return status;
-            *(expected(t, &o, level, level) <= CLOSE_RMS ? &low : &high) = guess;
-        }
-        if (low == *good) break;
+        int32_t step;
         bool close;
-        set_steps(&t->truth, low, 0, 0);
-        lathe_status status = try_steps(&o, t, level, level);
-        if (!status) status = measure(&close, &o, t, level);
+        lathe_status status = guess_step(&step, s, *good, bad);
+        if (!status && step == *good) break;
+        if (!status) status = measure_step(&close, s, step);
         if (status) return status;
-        *(close ? good : &bad) = low;
-        first = expected(t, &o, level, level);
-        if (close && first > CLOSE_RMS * NEAR) break;
+        *(close ? good : &bad) = step;
+        *sure |= close;
+        if (close && expected_of(s, step) > CLOSE_RMS * NEAR) break;
     }
-    return LATHE_OK;
+    return *sure ? LATHE_OK : measure_step(sure, s, *good);
 }
 
 /* What a client has fetched when it has a level, more or less. */
-static lathe_status cost_of(size_t *bytes, trial *t, uint32_t level) {
+static lathe_status cost_of(size_t *bytes, trial *t, uint32_t level, int32_t step) {
     enum { RECORD = 21 };
-    outcome o;
-    lathe_status status = try_steps(&o, t, LATHE_MAX_LEVELS, level);
-    *bytes = RECORD * level;
-    for (uint32_t i = 0; !status && i <= level; i++) *bytes += o.bytes[i];
+    set_steps(&t->truth, step, 0, 0);
+    lathe_status status = count_bytes(bytes, t, level);
+    *bytes += RECORD * level;
     return status;
 }
 
@@ -186,15 +264,58 @@ static size_t samples_of(const lathe_radii *radii) {
     return samples;
 }
 
-/* The first level that a fine step brings close, or the one behind it, each with its coarsest step: the one that costs less. */
+enum { MANY = 8000 };          /* coded radii: to measure a second level of so many takes longer than it is worth */
+
+/* Is the level close with the fine step, with something to spare unless it is the last? What is far below the limit needs no measurement
+ * now, nor does a small shape, of which a second level is looked at anyway: a single tube's error at the limit, squared, is about so much
+ * of its estimate's square. What is chosen in the end has been measured. */
+static lathe_status look_at(bool *close, bool *sure, const outcome *fine, trial *t, uint32_t level, bool last) {
+    static const double FAR_BELOW = 0.7, CLEARLY = 0.95, SMALL = 0.75;
+    bool small = !last && samples_of(&t->truth) <= MANY;
+    double one_tube = (1 - 1 / SMALL) * CLOSE_RMS * CLOSE_RMS;
+    lathe_status status = LATHE_OK;
+    t->apart[level] = level && t->apart[level - 1] != 0 ? t->apart[level - 1] : small && t->truth.count == 1 ? one_tube : 0;
+    *sure = false;
+    *close = true;
+    double rms = fmax(fine->rms[level], expected(t, fine, level, level));
+    if (last || (!small && rms > CLOSE_RMS * FAR_BELOW)) {
+        status = measure(close, fine, t, level, last ? t->samples : t->samples / 2);
+        *sure = *close;
+    }
+    *close &= last || expected(t, fine, level, level) <= CLOSE_RMS * CLEARLY;
+    return status;
+}
+
+typedef struct choice { uint32_t level; int32_t step; size_t bytes; } choice;
+
+/* A level with its coarsest step, if that costs less than what has been found. */
+static lathe_status choose_for_level(choice *best, trial *t, uint32_t level, int32_t start, double rms, int32_t bad, bool sure) {
+    search s = {.t = t, .level = level};
+    int32_t step = start;
+    size_t bytes = 0;
+    lathe_status status = LATHE_OK;
+    s.rms[start] = rms;
+    if (best->step) {
+        status = guess_step(&step, &s, start, bad);
+        if (!status) status = cost_of(&bytes, t, level, step);
+        if (status || bytes >= best->bytes) return status;
+        s.in_hand = 0, step = start;
+    }
+    status = search_step(&step, &sure, &s, bad);
+    if (!status && sure) status = cost_of(&bytes, t, level, step);
+    if (!status && sure && bytes < best->bytes) *best = (choice){level, step, bytes};
+    return status;
+}
+
+/* The first level that a fine step brings close, with its coarsest step; if that is fine still, the one behind it may cost less. (To look
+ * at the next level of every shape took a tenth of the planning of small ones and changed two archives of 27: 940 to 1175 B, 677 to 612.) */
 static lathe_status choose_step(uint32_t *level, trial *t) {
-    enum { MANY = 8000 };      /* coded radii: to measure a second level of so many takes longer than it is worth */
-    static const double MISJUDGED = 1.3, CLEARLY = 0.95;
+    enum { STILL_FINE = FINE_STEP + 4 };
+    static const double MISJUDGED = 1.3;
     outcome fine;
+    choice best = {.bytes = SIZE_MAX};
     uint32_t last = t->truth.level_count - 1, taken = 0;
-    int32_t start = FINE_STEP, bad = COARSE_STEP, best = 0;
-    size_t least = SIZE_MAX;
-    *level = 0;
+    int32_t start = FINE_STEP, bad = COARSE_STEP;
     set_steps(&t->truth, start, 0, 0);
     lathe_status status = try_steps(&fine, t, 0, last);
     if (!status && fine.rms[last] > CLOSE_RMS) {
@@ -202,29 +323,22 @@ static lathe_status choose_step(uint32_t *level, trial *t) {
         set_steps(&t->truth, start = FINEST_STEP, 0, 0);
         status = try_steps(&fine, t, 0, last);
     }
-    for (uint32_t i = 0; !status && i <= last && taken < 2; i++) {
-        bool close = false;
-        size_t bytes;
-        int32_t step = start;
+    for (uint32_t i = 0; !status && i <= last && taken < 2 && best.step < STILL_FINE; i++) {
+        bool close = true, sure = false;
         if (fine.rms[i] > CLOSE_RMS * MISJUDGED || (taken && samples_of(&t->truth) >> 2 * (last - i) > MANY)) continue;
-        if (taken) {
-            t->apart[i] = t->apart[i - 1];   /* measured at the end of the search */
-        } else {
-            status = measure(&close, &fine, t, i);
-            if (status || !close || (i < last && expected(t, &fine, i, i) > CLOSE_RMS * CLEARLY)) continue;
-        }
+        if (taken) t->apart[i] = t->apart[i - 1];   /* measured at the end of the search */
+        else status = look_at(&close, &sure, &fine, t, i, i == last);
+        if (status || !close) continue;
         taken++;
-        status = search_step(&step, t, i, bad, expected(t, &fine, i, i));
-        set_steps(&t->truth, step, 0, 0);
-        if (!status) status = cost_of(&bytes, t, i);
-        if (!status && bytes < least) least = bytes, best = step, *level = i;
+        status = choose_for_level(&best, t, i, start, fine.rms[i], bad, sure);
     }
-    set_steps(&t->truth, best, 0, 0);
-    return status ? status : taken ? LATHE_OK : LATHE_ERR_EMPTY;
+    set_steps(&t->truth, best.step, 0, 0);
+    *level = best.level;
+    return status ? status : best.step ? LATHE_OK : LATHE_ERR_EMPTY;
 }
 
 /* The step of the levels behind the close one: as coarse as errors then keep falling, down to what the last level may have. */
-static lathe_status choose_fine_step(size_t *bytes, trial *t, uint32_t level) {
+static lathe_status choose_fine_step(trial *t, uint32_t level) {
     outcome o = {0};
     uint32_t last = t->truth.level_count - 1;
     int32_t step = t->truth.step, taken = step;
@@ -235,17 +349,14 @@ static lathe_status choose_fine_step(size_t *bytes, trial *t, uint32_t level) {
     lathe_status status = LATHE_OK;
     for (int i = high / 2; !status && high - low > 1; i = (low + high) / 2) {
         set_steps(&t->truth, step, level == last ? 0 : level + 1, step - FINER[i] < 0 ? 0 : step - FINER[i]);
-        status = try_steps(&o, t, level, last);
+        status = try_steps(&o, t, o.rms[level] > 0 ? level + 1 : level, last);
         double rms = level == last ? CLOSE_RMS : MOST_RMS;
         bool within = !status && expected(t, &o, last, level) <= rms && o.most[last] <= MOST_MAX, falls = within;
         for (uint32_t k = level; k < last; k++) falls &= expected(t, &o, k + 1, level) <= STILL * expected(t, &o, k, level);
         good |= within;
         if (falls) kept = true, taken = t->truth.fine_step, high = i;
         else low = i;
-        if (falls || (within && !kept)) {
-            taken = t->truth.fine_step;
-            for (uint32_t k = 0, sum = 0; k <= last; k++) *bytes = sum += (uint32_t)o.bytes[k];
-        }
+        if (within && !kept) taken = t->truth.fine_step;
     }
     set_steps(&t->truth, step, level == last ? 0 : level + 1, taken);
     return status ? status : good ? LATHE_OK : LATHE_ERR_EMPTY;
@@ -260,8 +371,9 @@ static bool sound(const lathe_mesh *mesh, int64_t components, int64_t euler, boo
            !r.duplicate_positions && !r.self_intersections && (int64_t)r.components == components && r.euler == euler;
 }
 
-/* The overlay makes a sound surface of whatever outlines fit together, strips of rows that do not turn need no check at all: what has few
- * triangles is checked as a whole, as much as for the topology; else outlines are. */
+/* The overlay makes a sound surface of whatever outlines fit together, strips of rows that do not turn cannot cross themselves: what has
+ * few triangles is checked for its topology, else outlines are. All is checked of level 0, which turns the sharpest corners, and of strips
+ * that turn. */
 static lathe_status check_level(bool *good, trial *t, lathe_radii *coded, uint32_t level, int64_t components, int64_t euler) {
     enum { FEW = 3000 };
     lathe_surface_counts counts = {0};
@@ -278,22 +390,21 @@ static lathe_status check_level(bool *good, trial *t, lathe_radii *coded, uint32
     if (status || !*good || (level && (coded->count == 1 && !coded->tubes[0].map.turn))) return status;
     if (level && (uint64_t)shown * coded->tubes[0].map.rays / stride * 2 > FEW) return LATHE_OK;
     status = lathe__radii_mesh(&mesh, &t->arena[1], coded, level, &counts, &shown);
-    if (!status) *good = sound(&mesh, components, euler, true);
+    if (!status) *good = sound(&mesh, components, euler, coded->tubes[0].map.turn || (coded->count > 1 && !level));
     lathe_mesh_free(&mesh);
     return status;
 }
 
-static lathe_status check_levels(trial *t, const lathe_structure_state *state) {
+/* Codes all levels; their bytes. */
+static lathe_status check_levels(size_t *bytes, trial *t, const lathe_structure_state *state) {
     lathe_radii coded = frame_of(t);
     lathe_topology all = {.components = 1, .euler = 1};
     bool good = true;
     lathe_status status = t->truth.count > 1 ? lathe__mask_topology(&all, &state->mask, NULL) : LATHE_OK;
     lathe__arena_reset(&t->arena[0]);
+    *bytes = 0;
     for (uint32_t level = 0; !status && good && level < coded.level_count; level++) {
-        lathe_range_encoder e;
-        lathe__encoder_start(&e);
-        status = lathe__radii_code(&coded, &t->truth, &t->arena[0], level, put_number, &e);
-        lathe__encoder_free(&e);
+        status = add_bytes(bytes, &coded, t, level);
         if (!status) status = check_level(&good, t, &coded, level, all.components + all.cavities, 2 * all.euler);
     }
     return status ? status : good ? LATHE_OK : LATHE_ERR_EMPTY;
@@ -301,9 +412,7 @@ static lathe_status check_levels(trial *t, const lathe_structure_state *state) {
 
 /* ---- from loops to maps ---- */
 
-static lathe_status fit_tubes(lathe_radii *truth, lathe_arena *arena, lathe_arena *scratch, const lathe_traced_tubes *traced,
-                              const lathe_encode_source *source, int32_t turn) {
-    lathe_grey grey = {between_pixels, (void *)(uintptr_t)source, source->iso};
+static lathe_status fit_tubes(lathe_radii *truth, lathe_arena *arena, lathe_arena *scratch, const lathe_traced_tubes *traced) {
     lathe_status status = LATHE_OK;
     truth->count = traced->count;
     truth->tubes = LATHE_NEW(arena, lathe_radius_tube, traced->count);
@@ -315,33 +424,44 @@ static lathe_status fit_tubes(lathe_radii *truth, lathe_arena *arena, lathe_aren
         double back;
         tube->first = from->first;
         tube->hole = from->hole;
-        tube->map = (lathe_radius_map){.slices = from->rows, .level_count = lathe__tube_passes(from->rows, truth->level_count), .turn = turn,
-                                       .fall = FALL, .farthest = (truth->width + truth->height) * LATHE_RADIUS_ONE};
-        status = lathe__radius_fit(&tube->map, arena, scratch, from->loops, from->first, from->hole, source->value ? &grey : NULL, &back);
+        tube->map = (lathe_radius_map){.slices = from->rows, .level_count = lathe__tube_passes(from->rows, truth->level_count), .fall = FALL,
+                                       .farthest = (truth->width + truth->height) * LATHE_RADIUS_ONE};
+        status = lathe__radius_fit(&tube->map, arena, scratch, from->loops, &back);
         bool wide = traced->count > 1 && tube->map.rays > LATHE_TUBE_MOST_RAYS;
         if (!status && (back > MOST_BACK || wide)) status = LATHE_ERR_EMPTY;
     }
     return status;
 }
 
-/* The first fit, and for a tube that turns another with its rays turning along; the one with fewer bytes at one step stays. */
-static lathe_status fit_turned(trial *t, lathe_structure_state *state, lathe_arena *scratch, const lathe_traced_tubes *traced,
-                               const lathe_encode_source *source, double slice) {
-    lathe_status status = fit_tubes(&t->truth, &state->arena, scratch, traced, source, 0);
+static lathe_status follow(lathe_radius_tube *tube, lathe_arena *scratch, const lathe_grey *grey) {
+    lathe_status status = lathe__radius_follow(&tube->map, scratch, tube->first, tube->hole, grey);
+    lathe__arena_reset(scratch);
+    return status;
+}
+
+/* Of a tube that turns, the rays that turn along, if that takes clearly fewer bytes at one step: their surface must be checked. */
+static lathe_status turn_tube(trial *t, lathe_arena *arena, lathe_arena *scratch, const lathe_traced_tubes *traced, const lathe_grey *grey,
+                              int32_t turn) {
+    lathe_radius_tube *tube = &t->truth.tubes[0];
+    lathe_radius_map straight = tube->map;
+    uint32_t last = t->truth.level_count - 1;
+    size_t before, bytes;
+    set_steps(&t->truth, FINE_STEP, 0, 0);
+    lathe_status status = count_bytes(&before, t, last);
+    if (!status) status = lathe__radius_turn(&tube->map, arena, traced->tubes[0].loops, turn);
+    if (!status) status = follow(tube, scratch, grey);
+    if (!status) status = count_bytes(&bytes, t, last);
+    if (!status && bytes + before / 32 >= before) tube->map = straight;
+    return status;
+}
+
+static lathe_status fit_maps(trial *t, lathe_structure_state *state, lathe_arena *scratch, const lathe_traced_tubes *traced,
+                             const lathe_encode_source *source, double slice) {
+    lathe_grey grey = {between_pixels, (void *)(uintptr_t)source, source->iso};
+    lathe_status status = fit_tubes(&t->truth, &state->arena, scratch, traced);
     int32_t turn = status || traced->count > 1 ? 0 : estimate_turn(&t->truth.tubes[0].map);
-    if (!status && turn) {
-        lathe_radii straight = t->truth;
-        outcome o[2];
-        uint32_t last = t->truth.level_count - 1;
-        set_steps(&t->truth, FINE_STEP, 0, 0);
-        status = try_steps(&o[0], t, LATHE_MAX_LEVELS, last);
-        if (!status) status = fit_tubes(&t->truth, &state->arena, scratch, traced, source, turn);
-        if (!status) status = try_steps(&o[1], t, LATHE_MAX_LEVELS, last);
-        size_t bytes[2] = {0, 0};
-        for (int i = 0; i < 2; i++)
-            for (uint32_t level = 0; level <= last; level++) bytes[i] += o[i].bytes[level];
-        if (bytes[1] >= bytes[0]) t->truth = straight;
-    }
+    for (uint32_t i = 0; !status && i < t->truth.count; i++) status = follow(&t->truth.tubes[i], scratch, &grey);
+    if (!status && turn) status = turn_tube(t, &state->arena, scratch, traced, &grey, turn);
     return status ? status : lathe__estimate_start(&t->estimate, &state->arena, &t->truth, slice);
 }
 
@@ -358,7 +478,10 @@ static size_t count_borders(const lathe_mask *mask) {
 static lathe_status earns_its_place(bool *good, size_t bytes, const trial *t, const lathe_structure_state *state) {
     size_t rasters = t->borders / 30 + 110;
     lathe_status status = LATHE_OK;
-    if ((double)bytes > MOST_BYTES * (double)rasters) status = lathe__pyramid_cost(&rasters, &state->mask, t->spacing);
+    if ((double)bytes > MOST_BYTES * (double)rasters) {
+        size_t enough = (size_t)((double)bytes / MOST_BYTES) + 1;
+        status = lathe__pyramid_cost(&rasters, &state->mask, t->spacing, enough);
+    }
     *good = (double)bytes <= MOST_BYTES * (double)rasters;
     return status;
 }
@@ -368,8 +491,8 @@ static lathe_status choose(trial *t, const lathe_structure_state *state) {
     size_t bytes = 0;
     bool good = true;
     lathe_status status = choose_step(&level, t);
-    if (!status) status = choose_fine_step(&bytes, t, level);
-    if (!status) status = check_levels(t, state);
+    if (!status) status = choose_fine_step(t, level);
+    if (!status) status = check_levels(&bytes, t, state);
     if (!status) status = earns_its_place(&good, bytes, t, state);
     return status ? status : good ? LATHE_OK : LATHE_ERR_EMPTY;
 }
@@ -388,15 +511,18 @@ lathe_status lathe__choose_radii(lathe_baked_structure *out, lathe_structure_sta
     t.pixel = pixel / least;
     t.voxel = least;
     t.borders = count_borders(&state->mask);
-    t.samples = t.borders < 8000 ? 400 : t.borders < 30000 ? t.borders / 20 : 1500;
+    t.samples = t.borders < 4000 ? 400 : t.borders < 15000 ? t.borders / 10 : 1500;
     lathe_traced_tubes traced;
     lathe_arena loops = {0};
     lathe_status status = lathe__radius_trace(&traced, &loops, &state->mask, state->fraction);
-    if (!status) status = fit_turned(&t, state, &arena[0], &traced, source, mm[frame[2]] / pixel);
+    if (!status) status = fit_maps(&t, state, &arena[0], &traced, source, mm[frame[2]] / pixel);
     lathe__arena_free(&loops);
-    if (!status) status = lathe__reference_build(&t.reference, volume, axis, &state->mask, boundary, source->iso);
+    lathe_reference *own = NULL;
+    if (!status && source->reference) status = source->reference(source->context, &t.reference);
+    else if (!status) status = lathe__reference_build(&own, volume, axis, &state->mask, boundary, source->iso);
+    if (own) t.reference = own;
     if (!status) status = choose(&t, state);
-    lathe__reference_free(&t.reference);
+    lathe__reference_free(&own);
     lathe__arena_reset(&arena[0]);
     for (int i = 0; i < 3; i++) lathe__arena_free(&trials[i]);
     if (status) return status == LATHE_ERR_EMPTY || status == LATHE_ERR_LIMIT ? LATHE_OK : status;

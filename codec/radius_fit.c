@@ -1,4 +1,4 @@
-/* From the loops of a tube to its radius map: the outermost crossing on each ray of each row's loop. */
+/* From the loops of a tube to its radius map: the outermost crossing on each ray of each row's loop; then where the grey values say. */
 #include <math.h>
 #include <string.h>
 #include "centre.h"
@@ -12,7 +12,7 @@ typedef struct fit {
     const lathe_row_loop *loops;
     int32_t first;
     bool hole;
-    const lathe_grey *grey;    /* NULL: the outline is the truth */
+    const lathe_grey *grey;
     double (*direction)[2];    /* of each ray, before its row's turn */
     double back, area;         /* twice, lattice units squared */
 } fit;
@@ -47,11 +47,14 @@ static double goes_back(const lathe_row_loop *loop, const int32_t centre[2]) {
 }
 
 /* The longest distance along each ray. */
-static void cast_row(int32_t *radius, const fit *f, int32_t row, const int32_t centre[2], const double turn[2]) {
+static void cast_row(const fit *f, int32_t row) {
     const lathe_row_loop *loop = &f->loops[row];
+    const int32_t *centre = f->map->centre[row];
     uint32_t rays = f->map->rays, n = loop->count;
-    double cx = centre[0] * 0.5 * LATHE_LATTICE_ONE, cy = centre[1] * 0.5 * LATHE_LATTICE_ONE;
-    memset(radius, 0, rays * sizeof *radius);
+    int32_t *radius = f->map->radius + (size_t)row * rays;
+    double cx = centre[0] * 0.5 * LATHE_LATTICE_ONE, cy = centre[1] * 0.5 * LATHE_LATTICE_ONE, turn[2];
+    row_turn(turn, f, row);
+    for (uint32_t i = 0; i < rays; i++) radius[i] = LATHE_RADIUS_LEAST;
     double next = ray_position(f, row, loop->points[0].x - cx, loop->points[0].y - cy);
     for (uint32_t i = 0; i < n; i++) {
         lathe_point p = loop->points[i], q = loop->points[i + 1 < n ? i + 1 : 0];
@@ -65,7 +68,7 @@ static void cast_row(int32_t *radius, const fit *f, int32_t row, const int32_t c
             ray_direction(d, f, turn, index);
             double across = (qx - px) * d[1] - (qy - py) * d[0];
             double length = fabs(across) < 1e-9 ? hypot(px, py) : ((qx - px) * -py - (qy - py) * -px) / -across;
-            int32_t r = (int32_t)lround(length * LATHE_RADIUS_ONE / LATHE_LATTICE_ONE);
+            int32_t r = (int32_t)(length * LATHE_RADIUS_ONE / LATHE_LATTICE_ONE + 0.5);
             if (r > radius[index]) radius[index] = r;
         }
     }
@@ -86,9 +89,9 @@ static double depth(const fit *f, double u, double v, int32_t row) {
 }
 
 /* Where the grey values cross iso near a radius that the mask's outline has, radius units: from there half a pixel at a time until the
- * crossing lies between, then the line between and halving in turn. */
+ * crossing lies between, then the line between; an end that stays counts half from then on. */
 static int32_t grey_radius(const fit *f, int32_t row, const int32_t centre[2], const double d[2], int32_t radius) {
-    enum { REACH = 3, TURNS = 8 };
+    enum { REACH = 3, TURNS = 8, EXACT = 256 };
     double low = radius / (double)LATHE_RADIUS_ONE, high = low, u = centre[0] * 0.5, v = centre[1] * 0.5;
     double inside = depth(f, u + low * d[0], v + low * d[1], row), outside = inside;
     for (int i = 0; inside < 0 && i < REACH && low > 0; i++) {
@@ -102,19 +105,20 @@ static int32_t grey_radius(const fit *f, int32_t row, const int32_t centre[2], c
         outside = depth(f, u + high * d[0], v + high * d[1], row);
     }
     if (inside < 0 || outside >= 0) return radius;
-    for (int i = 0; i < TURNS && high - low > 1.0 / 256; i++) {
-        double at = i & 1 ? (low + high) / 2 : low + (high - low) * (inside / (inside - outside)), x = depth(f, u + at * d[0], v + at * d[1], row);
-        if (fabs(x) < (inside - outside) / 256) return (int32_t)lround(at * LATHE_RADIUS_ONE);
-        if (x >= 0) low = at, inside = x;
-        else high = at, outside = x;
+    double enough = (inside - outside) / EXACT, at = low;
+    for (int i = 0, side = 0; i < TURNS && high - low > 1.0 / EXACT; i++) {
+        at = low + (high - low) * (inside / (inside - outside));
+        double x = depth(f, u + at * d[0], v + at * d[1], row);
+        if (fabs(x) < enough) break;
+        if (x >= 0) low = at, inside = x, outside *= side > 0 ? 0.5 : 1, side = 1;
+        else high = at, outside = x, inside *= side < 0 ? 0.5 : 1, side = -1;
     }
-    return (int32_t)lround((low + (high - low) * (inside / (inside - outside))) * LATHE_RADIUS_ONE);
+    return (int32_t)(at * LATHE_RADIUS_ONE + 0.5);
 }
 
 /* How far a cap rises where the grey values fall below iso above the centre, in eighths of a slice. */
 static int32_t grey_apex(const fit *f, int32_t row, int side) {
     const int32_t *c = f->map->centre[row];
-    if (!f->grey) return LATHE_APEX_ONE / 2;
     double in = depth(f, c[0] * 0.5, c[1] * 0.5, row), out = depth(f, c[0] * 0.5, c[1] * 0.5, row + (side ? 1 : -1));
     if (in < 0 || out >= 0) return LATHE_APEX_ONE / 2;
     int32_t apex = (int32_t)lround(in / (in - out) * LATHE_APEX_ONE);
@@ -133,7 +137,7 @@ static double doubled_area(const lathe_row_loop *loop) {
 /* between: where the centre would be for nothing, or NULL. It is taken unless the loop's own sees more of it. */
 static lathe_status fit_row(fit *f, int32_t row, const int32_t *between) {
     const lathe_row_loop *loop = &f->loops[row];
-    int32_t *centre = f->map->centre[row], *radius = f->map->radius + (size_t)row * f->map->rays;
+    int32_t *centre = f->map->centre[row];
     double back = between ? goes_back(loop, between) : 1;
     if (between) memcpy(centre, between, 2 * sizeof *centre);
     if (back > 0) {
@@ -145,14 +149,7 @@ static lathe_status fit_row(fit *f, int32_t row, const int32_t *between) {
     }
     f->back += back;
     f->area += doubled_area(loop);
-    double turn[2], d[2];
-    row_turn(turn, f, row);
-    cast_row(radius, f, row, centre, turn);
-    for (uint32_t i = 0; i < f->map->rays; i++) {
-        ray_direction(d, f, turn, i);
-        if (f->grey) radius[i] = grey_radius(f, row, centre, d, radius[i]);
-        if (radius[i] < LATHE_RADIUS_LEAST) radius[i] = LATHE_RADIUS_LEAST;
-    }
+    cast_row(f, row);
     return LATHE_OK;
 }
 
@@ -175,18 +172,22 @@ static void choose_rays(lathe_radius_map *map, const lathe_row_loop *loops) {
     map->rays = rays < 16 ? 16 : rays > LATHE_RADIUS_MAX_RAYS ? LATHE_RADIUS_MAX_RAYS : rays;
 }
 
-lathe_status lathe__radius_fit(lathe_radius_map *map, lathe_arena *arena, lathe_arena *scratch, const lathe_row_loop *loops, int32_t first,
-                               bool hole, const lathe_grey *grey, double *back) {
-    fit f = {.map = map, .scratch = scratch, .loops = loops, .first = first, .hole = hole, .grey = grey};
+static lathe_status aim(fit *f, lathe_arena *arena) {
+    f->direction = lathe__arena_alloc(arena, f->map->rays, sizeof *f->direction);
+    if (!f->direction) return LATHE_ERR_MEMORY;
+    for (uint32_t i = 0; i < f->map->rays; i++) {
+        double angle = FULL_TURN * i / f->map->rays;
+        f->direction[i][0] = cos(angle), f->direction[i][1] = sin(angle);
+    }
+    return LATHE_OK;
+}
+
+lathe_status lathe__radius_fit(lathe_radius_map *map, lathe_arena *arena, lathe_arena *scratch, const lathe_row_loop *loops, double *back) {
+    fit f = {.map = map, .scratch = scratch, .loops = loops};
     choose_rays(map, loops);
     lathe_status status = lathe__radius_map_start(map, arena);
     int32_t last = map->slices - 1;
-    f.direction = lathe__arena_alloc(arena, map->rays, sizeof *f.direction);
-    if (!f.direction) return LATHE_ERR_MEMORY;
-    for (uint32_t i = 0; i < map->rays; i++) {
-        double angle = FULL_TURN * i / map->rays;
-        f.direction[i][0] = cos(angle), f.direction[i][1] = sin(angle);
-    }
+    if (!status) status = aim(&f, arena);
     for (uint32_t level = 0; !status && level < map->level_count; level++) {
         int32_t stride = (int32_t)1 << (map->level_count - 1 - level);
         if (!level) {
@@ -200,7 +201,33 @@ lathe_status lathe__radius_fit(lathe_radius_map *map, lathe_arena *arena, lathe_
             status = fit_row(&f, row, between);
         }
     }
-    for (int side = 0; !status && side < 2; side++) map->apex[side] = grey_apex(&f, side ? last : 0, side);
+    map->apex[0] = map->apex[1] = LATHE_APEX_ONE / 2;
     *back = f.area > 0 ? f.back / f.area : 1;
+    return status;
+}
+
+lathe_status lathe__radius_turn(lathe_radius_map *map, lathe_arena *arena, const lathe_row_loop *loops, int32_t turn) {
+    fit f = {.map = map, .loops = loops};
+    map->turn = turn;
+    map->radius = LATHE_NEW(arena, int32_t, (size_t)map->slices * map->rays);
+    lathe_status status = map->radius ? aim(&f, arena) : LATHE_ERR_MEMORY;
+    for (int32_t row = 0; !status && row < map->slices; row++) cast_row(&f, row);
+    return status;
+}
+
+lathe_status lathe__radius_follow(lathe_radius_map *map, lathe_arena *arena, int32_t first, bool hole, const lathe_grey *grey) {
+    fit f = {.map = map, .first = first, .hole = hole, .grey = grey};
+    lathe_status status = aim(&f, arena);
+    for (int32_t row = 0; !status && row < map->slices; row++) {
+        int32_t *radius = map->radius + (size_t)row * map->rays;
+        double turn[2], d[2];
+        row_turn(turn, &f, row);
+        for (uint32_t i = 0; i < map->rays; i++) {
+            ray_direction(d, &f, turn, i);
+            radius[i] = grey_radius(&f, row, map->centre[row], d, radius[i]);
+            if (radius[i] < LATHE_RADIUS_LEAST) radius[i] = LATHE_RADIUS_LEAST;
+        }
+    }
+    for (int side = 0; !status && side < 2; side++) map->apex[side] = grey_apex(&f, side ? map->slices - 1 : 0, side);
     return status;
 }

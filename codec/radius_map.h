@@ -32,7 +32,8 @@ typedef struct lathe_radius_map {
     int32_t farthest;          /* largest radius allowed */
     int32_t (*centre)[2];      /* of a row, half pixels */
     int32_t *radius;           /* rays of each row, radius units */
-    int8_t *left;              /* what was left of each radius, in steps: contexts of later ones; NULL: nothing is coded */
+    uint8_t *left;             /* how much was left of each radius, in steps: contexts of later ones; NULL: radii pass no coder */
+    const bool *wanted;        /* with left NULL: which rows are predicted, and those that they need; NULL: all */
     lathe_radius_models *models;
 } lathe_radius_map;
 
@@ -43,13 +44,15 @@ lathe_status lathe__radius_map_start(lathe_radius_map *map, lathe_arena *arena);
 uint32_t lathe__radius_ray_stride(const lathe_radius_map *map, uint32_t level);
 
 /* One walk over the numbers of a level serves encoding and decoding. `code` gets the number that `truth` asks for and returns the
- * one that counts. truth: the map to be coded (encoder), or NULL. FORMAT: a number out of range. */
+ * one that counts; NULL: `coder` is a lathe_range_decoder, and numbers are read from there; if that is NULL, too, all are 0. truth:
+ * the map to be coded (encoder), or NULL. FORMAT: a number out of range. */
 typedef int32_t lathe_number_code(void *coder, lathe_number_model *model, int32_t number);
 typedef struct lathe_number_coder {
     lathe_number_code *code;
     void *coder;
     const lathe_radius_map *truth;
 } lathe_number_coder;
+int32_t lathe__code_number(const lathe_number_coder *coder, lathe_number_model *model, int32_t number);
 lathe_status lathe__radius_walk(lathe_radius_map *map, uint32_t level, const lathe_number_coder *coder);
 
 /* What a row's centre is predicted to be from two known ones; rows low < row < high. */
@@ -70,9 +73,11 @@ typedef struct lathe_grey {
 
 /* radius_fit.c (encoder): one row of a tube: its loop, counter-clockwise. */
 typedef struct lathe_row_loop { const lathe_point *points; uint32_t count; } lathe_row_loop;
-/* The map of the loops of all rows: row 0 is slice `first`. slices, level_count, turn and farthest are set; rays are chosen. Arena
- * memory. grey: radii follow these values, or NULL: the loops. hole: the values are inside where they are below iso.
+/* The map of the loops of all rows. slices, level_count, turn and farthest are set; rays are chosen. Arena memory.
  * *back: how much of the loops turns back as seen from their centres, as a share of their area: 0 if all are stars. */
-lathe_status lathe__radius_fit(lathe_radius_map *map, lathe_arena *arena, lathe_arena *scratch, const lathe_row_loop *loops, int32_t first,
-                               bool hole, const lathe_grey *grey, double *back);
+lathe_status lathe__radius_fit(lathe_radius_map *map, lathe_arena *arena, lathe_arena *scratch, const lathe_row_loop *loops, double *back);
+/* The radii again, in an array of their own, with rays that turn. */
+lathe_status lathe__radius_turn(lathe_radius_map *map, lathe_arena *arena, const lathe_row_loop *loops, int32_t turn);
+/* Moves radii and caps to where grey values near by cross iso; row 0 is slice `first`. hole: inside is where they are below iso. */
+lathe_status lathe__radius_follow(lathe_radius_map *map, lathe_arena *arena, int32_t first, bool hole, const lathe_grey *grey);
 #endif

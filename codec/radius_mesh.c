@@ -3,11 +3,6 @@
 #include <stdlib.h>
 #include "radius_tubes.h"
 
-static int64_t squared(const int32_t *a, const int32_t *b) {
-    int64_t x = a[0] - b[0], y = a[1] - b[1];
-    return x * x + y * y;
-}
-
 lathe_point lathe__radius_place(const lathe_radius_map *map, const int32_t centre[2], int32_t row, uint32_t ray, int32_t radius) {
     uint32_t turn = (uint32_t)map->turn * (uint32_t)row;
     lathe_point d = lathe__ray_direction((ray * (65536 / map->rays) + turn) & 65535, 65536);
@@ -20,36 +15,32 @@ lathe_point lathe__radius_point(const lathe_radius_map *map, int32_t row, uint32
     return lathe__radius_place(map, map->centre[row], row, ray, map->radius[(size_t)row * map->rays + ray]);
 }
 
-/* Directions of a row's rays: a quarter of them is computed, the others are that one turned. */
-typedef struct fan {
-    lathe_point d[LATHE_RADIUS_MAX_RAYS / 4];
-    uint32_t turn;             /* what they have been computed for */
-} fan;
-
-static void aim(fan *f, const lathe_radius_map *map, uint32_t turn, uint32_t stride) {
+static void aim(lathe_ray_fan *f, const lathe_radius_map *map, uint32_t turn, uint32_t stride) {
     f->turn = turn;
     for (uint32_t i = 0; i < map->rays / 4; i += stride) f->d[i / stride] = lathe__ray_direction((i * (65536 / map->rays) + turn) & 65535, 65536);
 }
 
 /* As lathe__radius_place has it: radius * 2^10 * direction / 2^14, rounded towards 0. */
-static int32_t along(int32_t radius, int32_t direction) {
+static inline int32_t along(int32_t radius, int32_t direction) {
     return (int32_t)((int64_t)radius * direction / (LATHE_RAY_LENGTH / (LATHE_LATTICE_ONE / LATHE_RADIUS_ONE)));
 }
 
-static void place_row(lathe_mesh *mesh, const lathe_radius_map *map, fan *f, int32_t row, uint32_t stride) {
+void lathe__radius_ring(int32_t (*v)[3], ptrdiff_t step, lathe_ray_fan *f, const lathe_radius_map *map, int32_t row, uint32_t stride,
+                        int32_t height) {
     uint32_t turn = (uint32_t)map->turn * (uint32_t)row & 65535, quarter = map->rays / 4 / stride;
     if (f->turn != turn) aim(f, map, turn, stride);
     const int32_t *radius = map->radius + (size_t)row * map->rays;
-    int32_t x = map->centre[row][0] * (LATHE_LATTICE_ONE / 2), y = map->centre[row][1] * (LATHE_LATTICE_ONE / 2);
-    int32_t(*v)[3] = mesh->lattice + mesh->vertex_count;
-    for (int q = 0; q < 4; q++)
-        for (uint32_t i = 0; i < quarter; i++, v++, radius += stride) {
-            int32_t a = along(*radius, f->d[i].x), b = along(*radius, f->d[i].y);
-            v[0][0] = x + (q == 0 ? a : q == 1 ? -b : q == 2 ? -a : b);
-            v[0][1] = y + (q == 0 ? b : q == 1 ? a : q == 2 ? -b : -a);
-            v[0][2] = row * LATHE_LATTICE_ONE;
+    int32_t centre[2] = {map->centre[row][0] * (LATHE_LATTICE_ONE / 2), map->centre[row][1] * (LATHE_LATTICE_ONE / 2)};
+    for (int q = 0; q < 4; q++) {
+        /* q quarters of a turn: (a, b), (-b, a), (-a, -b), (b, -a). */
+        int first = q & 1, second = !first, x = q == 1 || q == 2 ? -1 : 1, y = q >= 2 ? -1 : 1;
+        const lathe_point *d = f->d;
+        for (const lathe_point *end = d + quarter; d < end; d++, v += step, radius += stride) {
+            v[0][first] = centre[first] + (first ? y : x) * along(*radius, d->x);
+            v[0][second] = centre[second] + (first ? x : y) * along(*radius, d->y);
+            v[0][2] = height;
         }
-    mesh->vertex_count += 4 * quarter;
+    }
 }
 
 static void add(lathe_mesh *mesh, uint32_t a, uint32_t b, uint32_t c) {
@@ -57,16 +48,33 @@ static void add(lathe_mesh *mesh, uint32_t a, uint32_t b, uint32_t c) {
     t[0] = a, t[1] = b, t[2] = c;
 }
 
-static void add_strip(lathe_mesh *mesh, uint32_t lower, uint32_t upper, uint32_t rays) {
-    const int32_t(*at)[3] = (const int32_t(*)[3])mesh->lattice;
-    uint32_t(*t)[3] = mesh->triangles + mesh->triangle_count;
-    for (uint32_t i = 0; i < rays; i++, t += 2) {
-        uint32_t k = i + 1 < rays ? i + 1 : 0, a = lower + i, b = lower + k, c = upper + k, d = upper + i;
-        bool from_a = squared(at[a], at[c]) <= squared(at[b], at[d]);
-        t[0][0] = a, t[0][1] = b, t[0][2] = from_a ? c : d;
-        t[1][0] = from_a ? a : b, t[1][1] = c, t[1][2] = d;
+/* Of a lower and an upper vertex. */
+typedef struct rung { int64_t sum[2], gap[2]; } rung;
+static inline rung rung_between(const int32_t *p, const int32_t *q) {
+    return (rung){{(int64_t)p[0] + q[0], (int64_t)p[1] + q[1]}, {(int64_t)p[0] - q[0], (int64_t)p[1] - q[1]}};
+}
+
+/* Of a quadrangle a b c d, |a - c|^2 - |b - d|^2 = (a + d - b - c) (a - d + b - c): is it from a to c? Products that hostile coordinates
+ * would make too large wrap. */
+static inline bool goes_from_a(const rung *l, const rung *r) {
+    uint64_t x = (uint64_t)(l->sum[0] - r->sum[0]) * (uint64_t)(l->gap[0] + r->gap[0]);
+    uint64_t y = (uint64_t)(l->sum[1] - r->sum[1]) * (uint64_t)(l->gap[1] + r->gap[1]);
+    return (int64_t)(x + y) <= 0;
+}
+
+void lathe__radius_strip(uint32_t (*t)[3], const int32_t (*at)[3], uint32_t lower, uint32_t upper, uint32_t rays) {
+    rung left = rung_between(at[lower], at[upper]), first = left;
+    uint32_t a = lower, d = upper, *out = *t;
+    for (const uint32_t last = lower + rays - 1; a < last; a++, d++, out += 6) {
+        rung right = rung_between(at[a + 1], at[d + 1]);
+        uint32_t from_a = goes_from_a(&left, &right);
+        out[0] = a, out[1] = a + 1, out[2] = d + from_a;
+        out[3] = a + 1 - from_a, out[4] = d + 1, out[5] = d;
+        left = right;
     }
-    mesh->triangle_count += 2 * rays;
+    bool from_a = goes_from_a(&left, &first);
+    out[0] = a, out[1] = lower, out[2] = from_a ? upper : d;
+    out[3] = from_a ? a : lower, out[4] = upper, out[5] = d;
 }
 
 /* side 0: below the first row, 1: above the last. */
@@ -89,10 +97,12 @@ lathe_status lathe__radius_strips(lathe_mesh *out, const lathe_radius_map *map, 
         lathe_mesh_free(&mesh);
         return LATHE_ERR_MEMORY;
     }
-    fan f = {.turn = UINT32_MAX};
-    for (uint32_t i = 0; i < rows; i++) {
-        place_row(&mesh, map, &f, list[i], stride);
-        if (i) add_strip(&mesh, mesh.vertex_count - 2 * rays, mesh.vertex_count - rays, rays);
+    lathe_ray_fan f = {.turn = UINT32_MAX};
+    for (uint32_t i = 0; i < rows; i++, mesh.vertex_count += rays) {
+        lathe__radius_ring(mesh.lattice + mesh.vertex_count, 1, &f, map, list[i], stride, list[i] * LATHE_LATTICE_ONE);
+        if (!i) continue;
+        lathe__radius_strip(mesh.triangles + mesh.triangle_count, (const int32_t(*)[3])mesh.lattice, mesh.vertex_count - rays, mesh.vertex_count, rays);
+        mesh.triangle_count += 2 * rays;
     }
     uint32_t top = mesh.vertex_count - rays;
     add_cap(&mesh, map, 0, 0, rays);

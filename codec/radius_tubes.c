@@ -8,8 +8,7 @@ enum { FORM_TUBES = 5, USUAL_STEP = 32, USUAL_FALL = 6, USUAL_LOG_RAYS = 6, MOST
 typedef struct head {
     lathe_radii *radii;
     const lathe_radii *truth;
-    lathe_number_code *code;
-    void *coder;
+    lathe_number_coder coder;
     lathe_number_model models[HEAD_KINDS];
     lathe_radius_map common;   /* what all tubes share */
 } head;
@@ -22,7 +21,7 @@ static void start_number(lathe_number_model *m, uint32_t not_zero, uint32_t long
 }
 
 static int32_t number(head *h, int kind, int32_t usual, int32_t truth) {
-    return usual + h->code(h->coder, &h->models[kind], h->truth ? truth - usual : 0);
+    return usual + lathe__code_number(&h->coder, &h->models[kind], h->truth ? truth - usual : 0);
 }
 
 uint32_t lathe__tube_passes(int32_t rows, uint32_t level_count) {
@@ -126,7 +125,7 @@ static lathe_status start_tubes(head *h, lathe_arena *arena) {
 }
 
 static lathe_status code_head(lathe_radii *radii, const lathe_radii *truth, lathe_arena *arena, lathe_number_code *code, void *coder) {
-    head h = {.radii = radii, .truth = truth, .code = code, .coder = coder};
+    head h = {.radii = radii, .truth = truth, .coder = {code, coder, NULL}};
     for (int k = 0; k < HEAD_KINDS; k++) start_number(&h.models[k], 128, 128);
     radii->tubes = LATHE_NEW(arena, lathe_radius_tube, LATHE_TUBES_MOST);
     if (!radii->tubes) return LATHE_ERR_MEMORY;
@@ -138,12 +137,6 @@ static lathe_status code_head(lathe_radii *radii, const lathe_radii *truth, lath
 }
 
 /* ---- passes ---- */
-
-static int32_t nothing(void *coder, lathe_number_model *model, int32_t n) {
-    (void)coder, (void)model, (void)n;
-    return 0;
-}
-static const lathe_number_coder PREDICT = {nothing, NULL, NULL};
 
 /* A tube begins where the one that ends below it, the last such, had its centre; else where the tube before begins. */
 static void start_from(lathe_radius_tube *tube, const lathe_radii *radii) {
@@ -163,9 +156,11 @@ static void start_from(lathe_radius_tube *tube, const lathe_radii *radii) {
 /* Later passes touch no radius of earlier ones: what a lower level shows can be made again at any time. */
 lathe_radius_map lathe__tube_shown(lathe_radius_tube *tube, uint32_t passes) {
     lathe_radius_map map = tube->map;
-    if (!tube->shown) return map;
-    map.radius = tube->shown, map.centre = tube->shown_centre, map.left = NULL;
+    static const lathe_number_coder PREDICT = {0};
+    map.left = NULL;
     if (passes > tube->passes) passes = tube->passes;
+    if (!tube->shown || passes == map.level_count) return map;
+    map.radius = tube->shown, map.centre = tube->shown_centre;
     if (tube->shown_passes == passes) return map;
     memcpy(tube->shown, tube->map.radius, (size_t)map.slices * map.rays * sizeof *tube->shown);
     memcpy(tube->shown_centre, tube->map.centre, (size_t)map.slices * sizeof *tube->shown_centre);

@@ -51,6 +51,15 @@ lathe_status lathe__radii_slices(int32_t **out, uint32_t *count, uint32_t *ray_s
 /* The tubes' polygons in a slice at a level, every stride-th ray of the last level, at least 8 rays. Points get arena memory. */
 lathe_status lathe__radii_outline(lathe_outline *out, lathe_arena *arena, lathe_radii *radii, uint32_t level, int32_t slice,
                                   uint32_t stride, uint32_t seed);
+/* radius_mesh.c: directions of a row's rays: a quarter of them, the others are that one turned. turn: what they have been computed for,
+ * UINT32_MAX: nothing yet. */
+typedef struct lathe_ray_fan { lathe_point d[LATHE_RADIUS_MAX_RAYS / 4]; uint32_t turn; } lathe_ray_fan;
+/* Every stride-th vertex of a row of a map, whose fan this is: v[0], v[step], v[2 * step], ... */
+void lathe__radius_ring(int32_t (*v)[3], ptrdiff_t step, lathe_ray_fan *fan, const lathe_radius_map *map, int32_t row, uint32_t stride,
+                        int32_t height);
+/* The 2 * rays triangles between two rings of vertices, each quadrangle by its shorter diagonal: an even triangle has two vertices of
+ * the lower ring, an odd one two of the upper. */
+void lathe__radius_strip(uint32_t (*triangles)[3], const int32_t (*at)[3], uint32_t lower, uint32_t upper, uint32_t rays);
 /* radius_mesh.c: strips between rows of a map that reaches from the first slice to the last, and two fans. */
 lathe_status lathe__radius_strips(lathe_mesh *out, const lathe_radius_map *map, const int32_t *rows, uint32_t count, uint32_t stride);
 #endif

@@ -83,18 +83,13 @@ static lathe_status decode_slices(lathe_structure_state *state, lathe_arena *scr
     return status || !(state->flags & LATHE_FLAG_CAPS) ? status : lathe__keep_caps(state, d);
 }
 
-static int32_t get_number(void *coder, lathe_number_model *model, int32_t number) {
-    (void)number;
-    return lathe__get_number(coder, model);
-}
-
 static lathe_status decode_radii(lathe_structure_state *state, lathe_range_decoder *d, uint32_t level) {
     if (!level) {
         state->radii = LATHE_NEW(&state->arena, lathe_radii, 1);
         if (!state->radii) return LATHE_ERR_MEMORY;
         *state->radii = lathe__radii_frame(state);
     }
-    lathe_status status = lathe__radii_code(state->radii, NULL, &state->arena, level, get_number, d);
+    lathe_status status = lathe__radii_code(state->radii, NULL, &state->arena, level, NULL, d);
     return !status && d->overrun > 8 ? LATHE_ERR_FORMAT : status;
 }
 

@@ -2,6 +2,7 @@
 #ifndef LATHE_STRUCTURE_ENCODE_H
 #define LATHE_STRUCTURE_ENCODE_H
 #include "archive_write.h"
+#include "mesh.h"
 #include "structure_state.h"
 
 /* What an encoder knows of the volume beyond the mask. */
@@ -9,6 +10,10 @@ typedef struct lathe_encode_source {
     double slice_ratio;        /* slice distance^2 / pixel area: how many voxels a cube of one slice distance has */
     /* The grey value at a position of the mask's frame (u, v, w; also outside), larger inside; NULL: none. Outside is below iso. */
     double (*value)(const void *context, int32_t u, int32_t v, int32_t w);
+    /* The same at u and u + 1 of v, then of v + 1, faster. NULL: value is asked. */
+    void (*square)(const void *context, int32_t u, int32_t v, int32_t w, float out[4]);
+    /* The surface that errors are measured against: made when first asked for, then kept by the context. NULL: make it for yourself. */
+    lathe_status (*reference)(const void *context, const lathe_reference **out);
     const void *context;
     double iso;
 } lathe_encode_source;
@@ -56,8 +61,8 @@ lathe_status lathe__pass_encode(lathe_range_encoder *e, lathe_structure_state *s
 /* Writes the schedule into the header's parameters from 2 on. Passes halve the longest stride; spacing: of the permuted axes, in mm;
  * most: voxels of the largest structure; levels: at most so many, 0: by the size. */
 void lathe__pyramid_plan(lathe_header *header, const double spacing[3], const int32_t most[3], uint32_t levels);
-/* Bytes of all passes of a mask as a model of its own. */
-lathe_status lathe__pyramid_cost(size_t *bytes, const lathe_mask *mask, const double spacing[3]);
+/* Bytes of all passes of a mask as a model of its own; no more passes than it takes to see that they are at least `enough`. */
+lathe_status lathe__pyramid_cost(size_t *bytes, const lathe_mask *mask, const double spacing[3], size_t enough);
 /* The mesh of a level, from the encoder's state. */
 lathe_status lathe__encoded_mesh(lathe_mesh *out, lathe_arena arena[2], lathe_structure_state *state, lathe_baked_structure *baked,
                                  uint32_t level, lathe_surface_counts *counts, uint32_t *shown);

@@ -47,7 +47,9 @@ void lathe__models_start(lathe_models *models, const lathe_header *header) {
 }
 
 lathe_status lathe__state_start_occupancy(lathe_structure_state *state, lathe_models *models) {
-    lathe_status status = models->occupancy ? LATHE_OK : lathe__occupancy_new(&models->occupancy, models->widest[0], models->widest[1]);
+    lathe_status status = LATHE_OK;
+    bool sure = state->pyramid && state->flags & LATHE_FLAG_SURE;
+    if (!models->occupancy) status = lathe__occupancy_new(&models->occupancy, models->widest[0], models->widest[1], sure);
     if (status) return status;
     if (!(state->flags & LATHE_FLAG_SHARED))
         return lathe__occupancy_copy(&state->occupancy, models->occupancy, state->mask.size[0], state->mask.size[1]);

@@ -45,25 +45,27 @@ lathe_status lathe__stack_outlines(lathe_mesh *out, lathe_arena *scratch, const 
     return lathe__stack_with_caps(out, scratch, outlines, heights, count, lattice, NULL, counts);
 }
 
-/* One try to build a slab: RANGE if vertices of the upper outline had to move first, and have, away from where the mesh still has
- * them. The last try takes what there is. */
-static lathe_status overlay_roomy(lathe_mesh_builder *builder, lathe_arena *scratch, lathe_slab *slab, lathe_overlay_counts *counts,
-                                  uint32_t tries) {
+lathe_status lathe__stack_slab(lathe_mesh_builder *builder, lathe_arena *scratch, lathe_slab *slab, const uint32_t *vertex,
+                               lathe_overlay_counts *counts) {
     const lathe_outline *upper = slab->outline[1];
-    slab->crowded = NULL;
-    if (tries && !LATHE_RASTERS_ONLY) {
-        slab->crowded = LATHE_NEW(scratch, uint8_t, upper->point_count + 1);
-        if (!slab->crowded) return LATHE_ERR_MEMORY;
-        memset(slab->crowded, 0, upper->point_count);
+    uint32_t below = slab->outline[0]->point_count;
+    for (uint32_t tries = LATHE_RASTERS_ONLY || slab->lattice ? 0 : TRIES;; tries--) {
+        slab->crowded = NULL;
+        if (tries && !LATHE_RASTERS_ONLY) {
+            slab->crowded = LATHE_NEW(scratch, uint8_t, upper->point_count + 1);
+            if (!slab->crowded) return LATHE_ERR_MEMORY;
+            memset(slab->crowded, 0, upper->point_count);
+        }
+        lathe_status status = lathe__overlay_slab(builder, scratch, slab, counts);
+        for (uint32_t i = 0; tries && i < upper->point_count; i++) {
+            int32_t *v = builder->mesh.lattice[vertex ? vertex[below + i] : slab->base + below + i];
+            lathe_point *p = &upper->points[i];
+            if (LATHE_RASTERS_ONLY || status != LATHE_ERR_RANGE) v[0] = p->x, v[1] = p->y;
+            else if (slab->crowded[i]) *p = lathe__jitter((lathe_point){v[0], v[1]}, tries);
+        }
+        lathe__arena_reset(scratch);
+        if (status != LATHE_ERR_RANGE) return status;
     }
-    lathe_status status = lathe__overlay_slab(builder, scratch, slab, counts);
-    for (uint32_t i = 0; tries && i < upper->point_count; i++) {
-        int32_t *v = builder->mesh.lattice[slab->base + slab->outline[0]->point_count + i];
-        lathe_point *p = &upper->points[i];
-        if (LATHE_RASTERS_ONLY || status != LATHE_ERR_RANGE) v[0] = p->x, v[1] = p->y;
-        else if (slab->crowded[i]) *p = lathe__jitter((lathe_point){v[0], v[1]}, tries);
-    }
-    return status;
 }
 
 lathe_status lathe__stack_with_caps(lathe_mesh *out, lathe_arena *scratch, const lathe_outline *outlines, const int32_t *heights,
@@ -85,12 +87,7 @@ lathe_status lathe__stack_with_caps(lathe_mesh *out, lathe_arena *scratch, const
                            .height = {(i ? heights[i - 1] : heights[0] - 1) * LATHE_LATTICE_ONE,
                                       (i < count ? heights[i] : heights[count - 1] + 1) * LATHE_LATTICE_ONE},
                            .base = base, .cap = LATHE_LATTICE_ONE / 2, .caps = caps, .lattice = lattice};
-        for (uint32_t tries = LATHE_RASTERS_ONLY || lattice ? 0 : TRIES; !status; tries--) {
-            status = overlay_roomy(&builder, scratch, &slab, &counts->overlay, tries);
-            lathe__arena_reset(scratch);
-            if (status != LATHE_ERR_RANGE) break;
-            status = LATHE_OK;
-        }
+        status = lathe__stack_slab(&builder, scratch, &slab, NULL, &counts->overlay);
         base = above;
     }
     if (status) {

@@ -51,6 +51,11 @@ typedef struct lathe_surface_style {
     lathe_caps *caps;          /* NULL: half a voxel */
 } lathe_surface_style;
 
+/* One slab. As long as there is no room, vertices of the upper outline that are crowded move away from where the mesh still has them;
+ * the last of many tries takes what there is. vertex: the mesh's vertex of each of the outlines', the upper one's behind the lower one's;
+ * NULL: they begin at slab->base. scratch is left reset. */
+lathe_status lathe__stack_slab(lathe_mesh_builder *builder, lathe_arena *scratch, lathe_slab *slab, const uint32_t *vertex,
+                               lathe_overlay_counts *counts);
 /* Closes a stack of outlines: slab by slab, air below the first and above the last. heights: slice numbers. */
 lathe_status lathe__stack_outlines(lathe_mesh *out, lathe_arena *scratch, const lathe_outline *outlines, const int32_t *heights,
                                    uint32_t count, bool lattice, lathe_surface_counts *counts);

@@ -31,4 +31,7 @@ void lathe__reference_free(lathe_reference **reference);
 /* samples: points on each surface (area-uniform, deterministic); vertices of the mesh count for the maximum too. */
 lathe_status lathe__reference_measure(lathe_metrics *out, const lathe_reference *reference, const lathe_mesh *mesh,
                                       size_t samples);
+/* The same RMS, and whether nothing that is looked at is farther away than a limit: faster than to know how far it is. */
+lathe_status lathe__reference_within(bool *within, double *rms_mm, const lathe_reference *reference, const lathe_mesh *mesh, size_t samples,
+                                     double limit_mm);
 #endif

@@ -403,8 +403,8 @@ lathe_status lathe__reference_build(lathe_reference **out, const lathe_volume *v
     return status;
 }
 
-lathe_status lathe__reference_measure(lathe_metrics *out, const lathe_reference *reference, const lathe_mesh *mesh,
-                                      size_t samples) {
+/* least2: what the largest squared distance of a vertex counts as at least. */
+static lathe_status measure(lathe_metrics *out, const lathe_reference *reference, const lathe_mesh *mesh, size_t samples, float least2) {
     if (!mesh->triangle_count) return LATHE_ERR_EMPTY;
     if (!has_good_triangles(mesh)) return LATHE_ERR_RANGE;
     if (!samples) samples = 1;
@@ -418,6 +418,7 @@ lathe_status lathe__reference_measure(lathe_metrics *out, const lathe_reference 
         tally there = sample_distances(&made, to_reference, samples);
         tally back = sample_distances(&reference->surface, to_mesh, samples);
         float max2 = there.max2 > back.max2 ? there.max2 : back.max2;
+        max2 = max2 > least2 ? max2 : least2;
         max2 = farthest_point(to_reference, (const float(*)[3])points, mesh->vertex_count, max2);
         const double unit = reference->unit_mm;
         out->rms_mm = unit * sqrt((there.sum2 > back.sum2 ? there.sum2 : back.sum2) / (double)samples);
@@ -427,4 +428,20 @@ lathe_status lathe__reference_measure(lathe_metrics *out, const lathe_reference 
     surface_free(&made);
     free(points);
     return status;
+}
+
+lathe_status lathe__reference_measure(lathe_metrics *out, const lathe_reference *reference, const lathe_mesh *mesh,
+                                      size_t samples) {
+    return measure(out, reference, mesh, samples, 0);
+}
+
+lathe_status lathe__reference_within(bool *within, double *rms_mm, const lathe_reference *reference, const lathe_mesh *mesh, size_t samples,
+                                     double limit_mm) {
+    lathe_metrics m;
+    float limit = (float)(limit_mm / reference->unit_mm);
+    lathe_status status = measure(&m, reference, mesh, samples, limit * limit);
+    if (status) return status;
+    *rms_mm = m.rms_mm;
+    *within = m.max_mm <= reference->unit_mm * sqrt((double)(limit * limit));
+    return LATHE_OK;
 }

@@ -91,7 +91,23 @@ static lathe_status push(seeds *s, int32_t u, int32_t v, int32_t w) {
 }
 
 static inline bool bit_at(const uint64_t *row, int32_t u) { return row[u >> 6] >> (u & 63) & 1; }
-static inline void clear_bit(uint64_t *row, int32_t u) { row[u >> 6] &= ~((uint64_t)1 << (u & 63)); }
+static void clear_bits(uint64_t *row, int32_t from, int32_t to) {
+    for (; from <= to; from = (from | 63) + 1) {
+        uint64_t bits = ~(uint64_t)0 << (from & 63);
+        if (to < (from | 63)) bits &= ~(uint64_t)0 >> (63 - (to & 63));
+        row[from >> 6] &= ~bits;
+    }
+}
+
+/* The first u of the run of 1 that u is in. */
+static int32_t run_start(const uint64_t *row, int32_t u) {
+    for (;;) {
+        uint64_t gaps = ~row[u >> 6] << (63 - (u & 63));   /* up to u, which is the highest bit */
+        if (gaps) return u - __builtin_clzll(gaps) + 1;
+        u = (u & ~63) - 1;
+        if (u < 0) return 0;
+    }
+}
 
 /* The first u in from .. to whose bit is `wanted`, or to + 1. Whole words are skipped. */
 static int32_t seek(const uint64_t *row, int32_t from, int32_t to, bool wanted) {
@@ -122,9 +138,8 @@ static lathe_status push_runs(seeds *s, const field *f, int32_t from, int32_t to
 static lathe_status flood_run(seeds *s, const field *f, seed at, bool corners) {
     uint64_t *row = field_row(f, at.v, at.w);
     if (!bit_at(row, at.u)) return LATHE_OK; /* another seed was faster */
-    int32_t from = at.u, to = seek(row, at.u, f->size[0] - 1, false) - 1;
-    while (from > 0 && bit_at(row, from - 1)) from--;
-    for (int32_t u = from; u <= to; u++) clear_bit(row, u);
+    int32_t from = run_start(row, at.u), to = seek(row, at.u, f->size[0] - 1, false) - 1;
+    clear_bits(row, from, to);
     int32_t low = corners && from > 0 ? from - 1 : from, high = corners && to + 1 < f->size[0] ? to + 1 : to;
     for (int32_t dw = -1; dw <= 1; dw++)
         for (int32_t dv = -1; dv <= 1; dv++) {

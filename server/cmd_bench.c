@@ -1,6 +1,6 @@
 /* lathe bench: how fast an archive decodes. lathe hash: one number for the last meshes, to compare platforms. */
 #include "bench.h"
-#include <math.h>
+#include "mesh_shading.h"
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -47,83 +47,11 @@ static lathe_status step_through(lathe_decoder *decoder, bool all_levels, decode
     }
 }
 
-/* ---- with what a renderer needs besides ---- */
-
-/* Where a renderer wants it; kept from mesh to mesh, and from run to run. */
-typedef struct dress {
-    float *positions, *normals;    /* 3 a vertex: mm; of length 1 */
-    uint32_t *indices;
-    struct vertex_sum *sums;
-    size_t vertices, triangles;    /* room for so many */
-} dress;
-
-typedef float four __attribute__((vector_size(16)));
-typedef struct vertex_sum { four at, normal; } vertex_sum;   /* the fourth is 0 */
-
-static void free_dress(dress *d) {
-    free(d->positions);
-    free(d->normals);
-    free(d->indices);
-    free(d->sums);
-    *d = (dress){0};
-}
-
-static lathe_status make_room(dress *d, const lathe_mesh *mesh) {
-    if (mesh->vertex_count <= d->vertices && mesh->triangle_count <= d->triangles && d->sums) return LATHE_OK;
-    size_t vertices = d->vertices > mesh->vertex_count ? d->vertices : (size_t)mesh->vertex_count + 1;
-    size_t triangles = d->triangles > mesh->triangle_count ? d->triangles : (size_t)mesh->triangle_count + 1;
-    free_dress(d);
-    d->positions = malloc(vertices * 12);
-    d->normals = malloc(vertices * 12);
-    d->indices = malloc(triangles * 12);
-    d->sums = aligned_alloc(32, vertices * sizeof *d->sums);
-    if (!d->positions || !d->normals || !d->indices || !d->sums) return LATHE_ERR_MEMORY;
-    d->vertices = vertices;
-    d->triangles = triangles;
-    return LATHE_OK;
-}
-
-/* Indices, and of each vertex the sum of its triangles' normals, by area. */
-static void add_normals(vertex_sum *sums, uint32_t *indices, const lathe_mesh *mesh, bool mirrored) {
-    int second = 1 + mirrored, third = 2 - mirrored;
-    for (uint32_t i = 0; i < mesh->triangle_count; i++, indices += 3) {
-        const uint32_t *t = mesh->triangles[i];
-        indices[0] = t[0], indices[1] = t[second], indices[2] = t[third];
-        vertex_sum *a = &sums[indices[0]], *b = &sums[indices[1]], *c = &sums[indices[2]];
-        four p = b->at - a->at, q = c->at - a->at;
-        four n = {p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0], 0};
-        a->normal += n;
-        b->normal += n;
-        c->normal += n;
-    }
-}
-
-static void make_unit(float *normals, const vertex_sum *sums, uint32_t vertex_count) {
-    for (uint32_t i = 0; i < vertex_count; i++, normals += 3) {
-        four n = sums[i].normal, square = n * n;
-        float length = sqrtf(square[0] + square[1] + square[2]), scale = length > 0 ? 1 / length : 0;
-        for (int k = 0; k < 3; k++) normals[k] = n[k] * scale;
-    }
-}
-
-static lathe_status dress_mesh(dress *d, const lathe_mesh *mesh, const lathe_transform *transform) {
-    lathe_status status = make_room(d, mesh);
-    if (status) return status;
-    lathe_mesh_positions(mesh, transform, d->positions);
-    for (uint32_t i = 0; i < mesh->vertex_count; i++) {
-        const float *p = d->positions + 3 * (size_t)i;
-        d->sums[i] = (vertex_sum){.at = {p[0], p[1], p[2], 0}};
-    }
-    add_normals(d->sums, d->indices, mesh, lathe_transform_mirrors(transform));
-    make_unit(d->normals, d->sums, mesh->vertex_count);
-    return LATHE_OK;
-}
-
 /* What to do with the last meshes, once they are built. */
 typedef enum hashing { HASH_NONE, HASH_ALL, HASH_EACH } hashing;
 
-/* clothes: of positions in mm, indices and normals, or NULL: only the meshes */
-static lathe_status last_meshes(lathe_decoder *decoder, hashing hash, dress *clothes, decode_result *result) {
+/* shading: also what a renderer needs besides, there; or NULL: only the meshes */
+static lathe_status last_meshes(lathe_decoder *decoder, hashing hash, lathe_mesh_shading *shading, decode_result *result) {
     uint32_t count = lathe_decoder_structures(decoder);
     result->hash = LATHE_FNV_START;
     for (uint32_t i = 0; i < count; i++) {
@@ -132,14 +60,14 @@ static lathe_status last_meshes(lathe_decoder *decoder, hashing hash, dress *clo
         result->last_triangles += mesh->triangle_count;
         result->vertices += mesh->vertex_count;
         if (hash == HASH_ALL) result->hash = lathe__hash_mesh(result->hash, mesh);
-        if (clothes && dress_mesh(clothes, mesh, lathe_decoder_transform(decoder, i))) return LATHE_ERR_MEMORY;
+        if (shading && lathe__mesh_shade(shading, mesh, lathe_decoder_transform(decoder, i))) return LATHE_ERR_MEMORY;
         if (hash == HASH_EACH) printf("%016llx\n", (unsigned long long)lathe__hash_mesh(LATHE_FNV_START, mesh));
     }
     return LATHE_OK;
 }
 
 static lathe_status decode_once(decode_result *out, const uint8_t *stream, size_t size, bool all_levels, hashing hash,
-                                dress *clothes, lathe_error *err) {
+                                lathe_mesh_shading *shading, lathe_error *err) {
     decode_result result;
     memset(&result, 0, sizeof result);
     double start = lathe__cpu_seconds();
@@ -149,7 +77,7 @@ static lathe_status decode_once(decode_result *out, const uint8_t *stream, size_
     lathe_decoder_build_meshes(decoder, all_levels);
     status = lathe_decoder_feed(decoder, stream, size);
     if (!status) status = step_through(decoder, all_levels, &result);
-    if (!status) status = last_meshes(decoder, hash, clothes, &result);
+    if (!status) status = last_meshes(decoder, hash, shading, &result);
     if (status) lathe_fail(err, status, "%s", lathe_decoder_error(decoder));
     result.seconds = lathe__cpu_seconds() - start;
     lathe_decoder_close(&decoder);
@@ -185,18 +113,18 @@ lathe_status lathe__measure_decoding(lathe__decode_speed *out, const lathe_model
                                      lathe_error *err) {
     size_t size;
     const uint8_t *stream = lathe__whole_stream(model, &size);
-    dress clothes = {0};
+    lathe_mesh_shading shading = {0};
     lathe_status status = LATHE_OK;
     for (int i = 0; !status && i < repeats; i++) {
-        decode_result plain, dressed;
+        decode_result plain, shaded;
         status = decode_once(&plain, stream, size, false, HASH_NONE, NULL, err);
-        if (!status) status = decode_once(&dressed, stream, size, false, HASH_NONE, &clothes, err);
+        if (!status) status = decode_once(&shaded, stream, size, false, HASH_NONE, &shading, err);
         if (status) break;
         out->triangles = plain.last_triangles;
         if (i == 0 || plain.seconds < out->seconds) out->seconds = plain.seconds;
-        if (i == 0 || dressed.seconds < out->with_normals) out->with_normals = dressed.seconds;
+        if (i == 0 || shaded.seconds < out->with_normals) out->with_normals = shaded.seconds;
     }
-    free_dress(&clothes);
+    lathe__mesh_shading_free(&shading);
     return status;
 }
 

@@ -36,28 +36,14 @@ static int stage_done(void *context, const char *stage, double fraction) {
     return lathe__interrupted();
 }
 
-static int time_reading(stage_clock *clock, const lathe_bake_arguments *a) {
-    lathe_volume *volume = NULL;
-    lathe_error err = {{0}};
-    clock->last = lathe__cpu_seconds();
-    lathe_status status = lathe__open_bake_input(&volume, a, &err);
-    if (status) return lathe__status_error("bench", a->input, status, &err);
-    add_stage(clock, "reading");
-    lathe_volume_close(&volume);
-    return LATHE_EXIT_OK;
-}
-
-/* Bakes the volume to path. The bake reads the volume again: that part is taken off its first stage. */
 static int bake_timed(stage_clock *clock, lathe_bake_arguments *a, const char *path) {
-    int status = time_reading(clock, a);
-    if (status) return status;
     a->output = path;
     a->quiet = true;
     a->draco = false;
     a->progress = stage_done;
     a->progress_context = clock;
-    clock->last = lathe__cpu_seconds() + clock->stages[0].seconds;
-    status = lathe__bake_input(&lathe__command_bench, a);
+    clock->last = lathe__cpu_seconds();
+    int status = lathe__bake_input(&lathe__command_bench, a);
     add_stage(clock, "writing");
     return status;
 }

@@ -1,6 +1,6 @@
 /* libFuzzer target: the packets of one structure of 20 x 20 x 6 voxels, without a container around them. The first two bytes say
  * where the input is cut into the packets of levels 0, 1 and 2, the third one is the header's flags (caps, topology kept, a pyramid
- * with two passes a level); after each packet, the mesh that a viewer would show is built. */
+ * with two passes a level, sure pixels); after each packet, the mesh that a viewer would show is built. */
 #include <stdlib.h>
 #include "structure_state.h"
 
@@ -23,8 +23,10 @@ static lathe_status decode_passes(lathe_structure_state *state, lathe_models *mo
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size);
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
-    static lathe_models models = {.widest = {3, 3}}; /* training takes longer than everything else here */
+    /* Of both kinds; training takes longer than everything else here. */
+    static lathe_models both[2] = {{.widest = {3, 3}}, {.widest = {3, 3}}};
     if (size < 3) return 0;
+    lathe_models *models = &both[bytes[2] & LATHE_FLAG_PYRAMID && bytes[2] & LATHE_FLAG_SURE];
     size_t left = size - 3, first = left * bytes[0] / 255, second = (left - first) * bytes[1] / 255;
     size_t begin[4] = {3, 3 + first, 3 + first + second, size};
     lathe_structure_state state = {.mask = {.size = {20, 20, 6}, .row_words = 1}, .fraction = 28, .flags = bytes[2], .level = -1};
@@ -39,8 +41,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {
         const char *fault = "";
         const uint8_t *packet = bytes + begin[level];
         size_t packet_size = begin[level + 1] - begin[level];
-        lathe_status status = state.pyramid ? decode_passes(&state, &models, level, packet, packet_size, &fault)
-                                            : lathe__structure_decode(&state, &arena[0], &models, level, packet, packet_size, &fault);
+        lathe_status status = state.pyramid ? decode_passes(&state, models, level, packet, packet_size, &fault)
+                                            : lathe__structure_decode(&state, &arena[0], models, level, packet, packet_size, &fault);
         if (status > 0 || (status && !fault[0])) abort();
         if (status) break;
         lathe_mesh mesh = {0};

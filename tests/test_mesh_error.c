@@ -121,6 +121,11 @@ static lathe_metrics measure(const ball *b, const lathe_reference *reference, do
     lathe_mesh mesh = make_sphere(b, r, (const double[3]){shift * 0.6, 0, shift * 0.8}, n);
     lathe_metrics m = {-1, -1, -1};
     CHECK_EQ(lathe__reference_measure(&m, reference, &mesh, samples), LATHE_OK);
+    double rms[2] = {-1, -1};
+    bool within[2] = {false, true};
+    for (int i = 0; i < 2; i++)
+        CHECK_EQ(lathe__reference_within(&within[i], &rms[i], reference, &mesh, samples, m.max_mm * (i ? 0.999 : 1.001)), LATHE_OK);
+    CHECK(within[0] && !within[1] && rms[0] == m.rms_mm && rms[1] == m.rms_mm);
     lathe_mesh_free(&mesh);
     return m;
 }

@@ -97,7 +97,57 @@ static lathe_status fit_mask(lathe_radius_map *map, const lathe_mask *mask, uint
     if (status || traced.count != 1 || traced.tubes[0].rows != mask->size[2]) return status ? status : LATHE_ERR_EMPTY;
     *map = (lathe_radius_map){.slices = mask->size[2], .level_count = level_count, .turn = turn, .fall = 6, .start = {0, 0, 1024},
                               .farthest = (mask->size[0] + mask->size[1]) * LATHE_RADIUS_ONE};
-    return lathe__radius_fit(map, &arena, &scratch, traced.tubes[0].loops, 0, false, NULL, &back);
+    return lathe__radius_fit(map, &arena, &scratch, traced.tubes[0].loops, &back);
+}
+
+/* Radii that follow grey values end on the circle that these are the distance from, straight and turned; a circle in pixels: the outline
+ * alone is up to half a pixel off. */
+typedef struct circle { double x, y, radius, sign; } circle;
+
+static double circle_depth(void *context, double u, double v, int32_t w) {
+    const circle *c = context;
+    return c->sign * (c->radius + 0.2 * w - hypot(u - c->x, v - c->y));
+}
+
+static void on_circle(const lathe_radius_map *map, const circle *c) {
+    int worst = 0;
+    for (int32_t row = 0; row < map->slices; row++)
+        for (uint32_t ray = 0; ray < map->rays; ray++) {
+            double angle = 6.283185307179586 * ((double)ray / map->rays + (double)map->turn * row / 65536);
+            double x = map->centre[row][0] * 0.5 - c->x, y = map->centre[row][1] * 0.5 - c->y, along = x * cos(angle) + y * sin(angle);
+            double radius = c->radius + 0.2 * (row + 3), length = sqrt(along * along - x * x - y * y + radius * radius) - along;
+            int miss = abs((int)lround(length * LATHE_RADIUS_ONE) - map->radius[(size_t)row * map->rays + ray]);
+            if (miss > worst) worst = miss;
+        }
+    CHECK(worst <= 1);
+}
+
+static void follows(void) {
+    enum { SLICES = 7 };
+    int32_t dims[3] = {48, 44, SLICES}, origin[3] = {0, 0, 0};
+    lathe_mask mask;
+    lathe_radius_map map;
+    lathe_traced_tubes traced;
+    for (int hole = 0; hole < 2; hole++) {
+        circle c = {23.2, 21.7, 12.3, hole ? -1 : 1};
+        const lathe_grey grey = {circle_depth, &c, 0};
+        if (lathe__mask_new(&mask, dims, origin)) abort();
+        for (int w = 0; w < SLICES; w++)
+            for (int v = 1; v < dims[1] - 1; v++)
+                for (int u = 1; u < dims[0] - 1; u++)
+                    if (c.sign * circle_depth(&c, u, v, w + 3) >= 0) lathe__mask_slice(&mask, w)[v] |= (uint64_t)1 << u;
+        CHECK(!fit_mask(&map, &mask, 3, 0));
+        CHECK(!lathe__radius_trace(&traced, &arena, &mask, 32));
+        CHECK(!lathe__radius_follow(&map, &scratch, 3, hole, &grey));
+        on_circle(&map, &c);
+        CHECK(!lathe__radius_turn(&map, &arena, traced.tubes[0].loops, 900));
+        CHECK(!lathe__radius_follow(&map, &scratch, 3, hole, &grey));
+        CHECK_EQ(map.turn, 900);
+        on_circle(&map, &c);
+        lathe__mask_free(&mask);
+        lathe__arena_reset(&arena);
+        lathe__arena_reset(&scratch);
+    }
 }
 
 static void tubes(void) {
@@ -158,7 +208,7 @@ static void start_truth(lathe_radii *truth, const lathe_mask *mask, const lathe_
         t->hole = traced->tubes[i].hole;
         t->map = (lathe_radius_map){.slices = traced->tubes[i].rows, .level_count = lathe__tube_passes(traced->tubes[i].rows, truth->level_count), .fall = 6,
                                     .farthest = (WIDE + TALL) * LATHE_RADIUS_ONE};
-        CHECK(!lathe__radius_fit(&t->map, &arena, &scratch, traced->tubes[i].loops, t->first, t->hole, NULL, &back));
+        CHECK(!lathe__radius_fit(&t->map, &arena, &scratch, traced->tubes[i].loops, &back));
     }
 }
 
@@ -172,6 +222,50 @@ static void check_surface(const lathe_mesh *mesh) {
 }
 
 static bool same_numbers(const int32_t *a, const int32_t *b, size_t count) { return !memcmp(a, b, count * sizeof *a); }
+
+/* The estimate again, without its short cuts: all rows of what is shown, each ray's end by the triangle of two rays and the chord. */
+static double plain_estimate(double *most, const lathe_radius_estimate *e, lathe_radii *radii, uint32_t level) {
+    int32_t *slices;
+    uint32_t count, stride;
+    double square = 0, weight = 0;
+    *most = 0;
+    CHECK(!lathe__radii_slices(&slices, &count, &stride, &scratch, radii, level));
+    for (uint32_t t = 0; t < radii->count; t++) {
+        lathe_radius_tube *tube = &radii->tubes[t];
+        const lathe_radius_map *truth = &e->truth->tubes[t].map;
+        lathe_radius_map m = lathe__tube_shown(tube, lathe__passes_at(radii, tube, level));
+        uint32_t q = m.rays / stride < 8 ? m.rays / 8 : stride;
+        for (int32_t row = 0; row < m.slices; row++) {
+            int32_t low = 0, high = m.slices - 1;
+            for (uint32_t i = 0; i < count; i++) {
+                int32_t at = slices[i] - tube->first;
+                if (at >= 0 && at < m.slices && at <= row) low = at;
+                if (at >= row && at < m.slices && at < high) high = at;
+            }
+            double part = high > low ? (double)(row - low) / (high - low) : 0;
+            for (uint32_t ray = 0; ray < m.rays; ray++) {
+                double angle = 6.283185307179586 * (ray % q) / m.rays, whole = 6.283185307179586 * q / m.rays, r[2], d = 0;
+                for (uint32_t k = 0; k < 2; k++) {
+                    uint32_t at = (ray / q * q + k * q) % m.rays;
+                    r[k] = m.radius[(size_t)low * m.rays + at] * (1 - part) + m.radius[(size_t)high * m.rays + at] * part;
+                }
+                double shown = r[0] * r[1] * sin(whole) / (r[0] * sin(angle) + r[1] * sin(whole - angle));
+                for (int k = 0; k < 2; k++) {
+                    double along = 6.283185307179586 * ray / m.rays, centre = m.centre[low][k] * (1 - part) + m.centre[high][k] * part;
+                    d += LATHE_RADIUS_ONE / 2.0 * (truth->centre[row][k] - centre) * (k ? sin(along) : cos(along));
+                }
+                size_t sample = (size_t)row * m.rays + ray;
+                d = fabs(truth->radius[sample] - shown + d) * (double)e->tubes[t].facing[sample];
+                square += (double)e->tubes[t].share[sample] * d * d;
+                weight += (double)e->tubes[t].share[sample];
+                if (d > *most) *most = d;
+            }
+        }
+    }
+    lathe__arena_reset(&scratch);
+    *most /= LATHE_RADIUS_ONE;
+    return sqrt(square / weight) / LATHE_RADIUS_ONE;
+}
 
 /* Codes and decodes; every level closes, with the topology of the voxels; what both sides know is the same, and never worse than before. */
 static size_t fork_trip(const lathe_radii *truth) {
@@ -201,6 +295,8 @@ static size_t fork_trip(const lathe_radii *truth) {
         lathe_mesh_free(&mesh);
         CHECK(!lathe__estimate_error(&rms, &most, &estimate, &scratch, &decoded, level));
         CHECK(rms < before * 1.02);
+        double plain_most, plain = plain_estimate(&plain_most, &estimate, &decoded, level);
+        CHECK(fabs(rms - plain) < 1e-4 && fabs(most - plain_most) < 1e-3);
         before = rms;
     }
     CHECK(before < 0.5);
@@ -265,6 +361,49 @@ static void loops_fit(void) {
     CHECK(!squares_fit(1000, 400, 1300, false));
     CHECK(!squares_fit(1000, 400, 600, true));   /* touching it */
     CHECK(!squares_fit(400, 1000, 0, true));     /* inside out */
+}
+
+/* The same of random polygons, their boxes left aside: is there a pair of edges of different loops that have a point in common? */
+static bool edges_cross(lathe_point a, lathe_point b, lathe_point c, lathe_point d) {
+    lathe_point at[4] = {a, b, c, d};
+    int64_t side[4] = {lathe__orient(c, d, a), lathe__orient(c, d, b), lathe__orient(a, b, c), lathe__orient(a, b, d)};
+    if (!side[0] && !side[1]) {   /* on one line: their extents overlap along both axes */
+        int32_t low[2][2], high[2][2];
+        for (int i = 0; i < 2; i++) {
+            lathe_point p = at[2 * i], q = at[2 * i + 1];
+            low[i][0] = p.x < q.x ? p.x : q.x, high[i][0] = p.x < q.x ? q.x : p.x;
+            low[i][1] = p.y < q.y ? p.y : q.y, high[i][1] = p.y < q.y ? q.y : p.y;
+        }
+        for (int k = 0; k < 2; k++)
+            if (high[0][k] < low[1][k] || high[1][k] < low[0][k]) return false;
+        return true;
+    }
+    return (side[0] <= 0 || side[1] <= 0) && (side[0] >= 0 || side[1] >= 0) && (side[2] <= 0 || side[3] <= 0) && (side[2] >= 0 || side[3] >= 0);
+}
+
+static void random_loops_fit(void) {
+    enum { CORNERS = 9 };
+    uint32_t fitting = 0;
+    for (int round = 0; round < 20000; round++) {
+        lathe_point points[2 * CORNERS];
+        lathe_loop loops[2] = {{.first = 0, .count = CORNERS}, {.first = CORNERS, .count = CORNERS}};
+        lathe_outline outline = {.point_count = 2 * CORNERS, .loop_count = 2, .points = points, .loops = loops};
+        for (int l = 0; l < 2; l++) {   /* stars; corners on a coarse lattice, so that touching is not rare */
+            double x = (double)(next_random() % 60), y = (double)(next_random() % 60), most = 4 + (double)(next_random() % 30);
+            for (int i = 0; i < CORNERS; i++) {
+                double angle = 6.283185307179586 * i / CORNERS, r = most * (0.5 + (next_random() % 64) / 128.0);
+                points[l * CORNERS + i] = (lathe_point){(int32_t)lround(x + r * cos(angle)), (int32_t)lround(y + r * sin(angle))};
+            }
+        }
+        bool cross = false;
+        for (int i = 0; i < CORNERS; i++)
+            for (int k = 0; k < CORNERS; k++)
+                cross |= edges_cross(points[i], points[(i + 1) % CORNERS], points[CORNERS + k], points[CORNERS + (k + 1) % CORNERS]);
+        bool fit = lathe__loops_fit(&outline);
+        if (cross && !CHECK(!fit)) return;
+        fitting += fit;
+    }
+    CHECK(fitting > 2000 && fitting < 18000);
 }
 
 /* What is too many tubes is told without fitting any. */
@@ -346,10 +485,12 @@ static void hostile(void) {
 }
 
 int main(void) {
+    follows();
     tubes();
     forks();
     too_many();
     loops_fit();
+    random_loops_fit();
     hostile_tubes();
     hostile();
     lathe__arena_free(&arena);

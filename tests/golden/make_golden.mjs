@@ -114,6 +114,14 @@ bake('pyramid_slice', raw('pyramid_slice', [40, 32, 1], (x, y) => ball(x - 18, y
 bake('pyramid_oblique', nifti('pyramid_oblique', [34, 31, 27], (x, y, z) => 100 + 60 * blob(x + 2, y + 3, z + 3), tilt), '--iso', '100', '--exact', '--axis', 'y');
 bake('pyramid_wide', raw('pyramid_wide', [150, 131, 3], disc(55, 150)), '--iso', '0', '--exact');
 bake('pyramid_one', raw('pyramid_one', [30, 28, 20], (x, y, z) => blob(x + 5, y + 5, z + 6)), '--iso', '0', '--levels', '1');
+/* Pyramids with SURE. The ones above were baked before there was it: today the same calls give it. Sizes for both tables, with enough
+ * pixels that most are sure; a model of its own and one for many; one slice and one level, where modes 0 and 1 are. */
+bake('sure', raw('sure', [70, 66, 40], (x, y, z) => 26 - Math.hypot(x - 35, y - 33, 1.4 * (z - 20)) + 3 * rough(x, y, z)), '--iso', '0', '--exact');
+bake('sure_shared', raw('sure_shared', [56, 37, 29], label), '--labels', 'all');
+bake('sure_independent', raw('sure_independent', [56, 37, 29], label, [1, 1, 1.1]), '--labels', 'all', '--independent', '--axis', 'x');
+bake('sure_wide', raw('sure_wide', [150, 131, 3], disc(55, 150)), '--iso', '0', '--exact');
+bake('sure_slice', raw('sure_slice', [40, 32, 1], (x, y) => ball(x - 18, y - 16, 0, 13) + 3 * rough(x, y, 3)), '--iso', '0', '--exact');
+bake('sure_one', raw('sure_one', [60, 58, 30], (x, y, z) => 22 - Math.hypot(x - 30, y - 29, 1.6 * (z - 15)) + 3 * rough(x, y, z)), '--iso', '0', '--levels', '1');
 /* Tubes: a hole that parts into two; one tube alone. */
 const trunk = (x, y, z) => Math.min(17 - Math.hypot(x - 22, (y - 22) * 1.2), z - 2, 41 - z);
 const vessel = (x, y, z) => {

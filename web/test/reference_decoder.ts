@@ -73,7 +73,7 @@ export interface Header {
     /** Of a pyramid: the axes that each level's passes halve; -1: its first raster. */
     passes: number[][] | null;
 }
-export const CAPS = 1, KEEP = 2, SHARED = 4, EXACT = 8, PYRAMID = 16;
+export const CAPS = 1, KEEP = 2, SHARED = 4, EXACT = 8, PYRAMID = 16, SURE = 32;
 const MAGIC = [0x89, 0x4c, 0x54, 0x48, 0x0d, 0x0a, 0x1a, 2];
 
 function readAffine(c: Cursor): number[][] {
@@ -389,10 +389,15 @@ class OccupancyModel {
     slots: Uint32Array;
     surprise = new Uint32Array(8 * 8 * 16).fill(2 ** 28);
     place = new Uint32Array(2 * 16 * 16).fill(2 ** 28);
-    seen = new Int32Array(8 * 6).fill(5461);
-    near = new Int32Array(16 * 6).fill(5461);
+    seen: Int32Array;
+    near: Int32Array;
     side = new Int32Array(32 * 6);
-    constructor(readonly bits: number) { this.slots = new Uint32Array(2 ** bits).fill(2 ** 31); }
+    small = new Uint32Array(4 * 2 ** 13).fill(2 ** 31);
+    constructor(readonly bits: number, readonly sure: boolean) {
+        this.slots = new Uint32Array(2 ** bits).fill(2 ** 31);
+        this.seen = new Int32Array(8 * 6).fill(sure ? 6553 : 5461);
+        this.near = new Int32Array(16 * 6).fill(sure ? 6553 : 5461);
+    }
 
     private learn(slots: Uint32Array, i: number, bit: number): void {
         const count = slots[i] & 1023, p = slots[i] >>> 10, rate = Math.floor(327680 / (5 * count + 8));
@@ -421,31 +426,37 @@ class OccupancyModel {
         return i;
     }
 
-    /** One mixed pixel: keys and salts of the six inputs, which weights. */
-    mix(decide: Decide, keys: [bigint, bigint][], near: number, side: number, truth: number): number {
+    /** One mixed pixel: its small context, keys and salts of the six inputs, which weights. */
+    mix(decide: Decide, small: number, keys: [bigint, bigint][], near: number, side: number, truth: number): number {
+        const [count, chance] = [this.small[small] & 1023, this.small[small] >>> 16];
+        if (this.sure && count >= 30 && (chance < 4096 || chance >= 61440)) return this.plain(this.small, small, decide, truth);
         const slot = keys.map(([key, salt]) =>
             Number((((key + (salt << 40n)) * times64) & (2n ** 64n - 1n)) >> BigInt(64 - this.bits)));
-        const l = slot.map((i) => LOGIT[this.slots[i] >>> 20]), seen = slot.map((i) => log((this.slots[i] & 1023) + 1));
+        /* Which inputs there are, and where their slots. */
+        const inputs = this.sure ? [0, 1, 3, 4, 5] : [0, 1, 2, 3, 4, 5];
+        const at = slot.map((place, i): [Uint32Array, number] => (this.sure && i === 0 ? [this.small, small] : [this.slots, place]));
+        const now = at.map(([slots, place]) => slots[place]);
+        const l = now.map((value) => LOGIT[value >>> 20]), seen = now.map((value) => log((value & 1023) + 1));
         let sum = 0;
-        for (let i = 0; i < 6; i++) sum += (this.seen[seen[i] * 6 + i] + this.near[near * 6 + i] + this.side[side * 6 + i]) * l[i];
+        for (const i of inputs) sum += (this.seen[seen[i] * 6 + i] + this.near[near * 6 + i] + this.side[side * 6 + i]) * l[i];
         const p = CHANCE[3071 + Math.min(Math.max(Math.floor(sum / 65536), -3071), 3071)], bit = decide(p, truth);
-        const step = Math.trunc(((bit * 65536 - p) * (this.mixed < 32768 ? 10 : 4)) / 16);
+        const step = Math.trunc(((bit * 65536 - p) * (this.sure ? 20 : this.mixed < 32768 ? 10 : 4)) / 16);
         if (this.mixed < 32768) this.mixed++;
-        for (let i = 0; i < 6; i++) {
+        for (const i of inputs) {
             const change = (l[i] * step + 32768) >> 16;
             this.seen[seen[i] * 6 + i] += change;
             this.near[near * 6 + i] += change;
             this.side[side * 6 + i] += change;
-            this.learn(this.slots, slot[i], bit);
+            this.learn(...at[i], bit);
         }
         return bit;
     }
 
     /** A copy with a larger table. */
     enlarged(bits: number): OccupancyModel {
-        const to = new OccupancyModel(bits);
+        const to = new OccupancyModel(bits, this.sure);
         to.limit = this.limit;
-        for (const name of ['surprise', 'place', 'seen', 'near', 'side'] as const) to[name].set(this[name]);
+        for (const name of ['surprise', 'place', 'seen', 'near', 'side', 'small'] as const) to[name].set(this[name]);
         to.slots = to.slots.map((_, i) => this.slots[i >>> (bits - this.bits)]);
         return to;
     }
@@ -518,7 +529,8 @@ class SliceWalk {
             [BigInt(causal25 | (centres << 25)), 3n], [BigInt(wide), 4n], [BigInt(causal10 | (below << 10)), 5n],
             [BigInt(causal10 | (above << 10)), 5n],
         ];
-        return this.model.mix(this.decide, keys, near, mode * 4 + B(0, 0, 1) + 2 * A(0, 0, 1), this.truthAt(x) ^ flip) ^ flip;
+        const small = R(-1, -1, 3) | (below << 3) | (above << 8) | (mode << 13);
+        return this.model.mix(this.decide, small, keys, near, mode * 4 + B(0, 0, 1) + 2 * A(0, 0, 1), this.truthAt(x) ^ flip) ^ flip;
     }
 }
 
@@ -553,23 +565,23 @@ function makeBlob(): Slice[] {
         values[w * area + i] > 0 && inner(i % BLOB) && inner(Math.floor(i / BLOB)) ? 1 : 0));
 }
 
-const modeOfGap = (gap: number): number => (gap >= 8 ? 5 : gap >= 4 ? 4 : gap >= 2 ? 3 : 2);
+const modeOfGap = (gap: number, sure: boolean): number => (gap < 2 ? 2 : gap < 4 || sure ? 3 : gap < 8 ? 4 : 5);
 
-function train(): OccupancyModel {
-    const model = new OccupancyModel(17), blob = makeBlob(), say: Decide = (_, truth) => truth;
+function train(sure: boolean): OccupancyModel {
+    const model = new OccupancyModel(17, sure), blob = makeBlob(), say: Decide = (_, truth) => truth;
     const code = (w: number, known: Known): void => void model.code(BLOB, BLOB, known, say, blob[w]);
     for (const w of [0, 8, 16]) code(w, { below: w ? blob[w - 8] : null, above: null, mode: w ? 1 : 0 });
     for (const gap of [4, 2, 1])
-        for (let w = gap; w < BLOB_SLICES; w += 2 * gap) code(w, { below: blob[w - gap], above: blob[w + gap], mode: modeOfGap(gap) });
-    model.limit = 254;
+        for (let w = gap; w < BLOB_SLICES; w += 2 * gap) code(w, { below: blob[w - gap], above: blob[w + gap], mode: modeOfGap(gap, sure) });
+    model.limit = sure ? 192 : 254;
     model.mixed = 0;
     return model;
 }
 
-let trained: OccupancyModel | undefined;
-function freshModel(area: number): OccupancyModel {
-    trained ??= train();
-    return trained.enlarged(area <= 4096 ? 17 : area <= 16384 ? 18 : 20);
+const trained: { [sure: string]: OccupancyModel } = {};
+function freshModel(area: number, flags: number): OccupancyModel {
+    const sure = (flags & PYRAMID) !== 0 && (flags & SURE) !== 0, model = (trained[String(sure)] ??= train(sure));
+    return model.enlarged(area <= 4096 ? 17 : area <= 16384 || sure ? 18 : 20);
 }
 
 // ---- radius maps ----
@@ -905,8 +917,8 @@ class Structure {
     }
 
     private startModel(): OccupancyModel {
-        if (!(this.flags & SHARED)) return freshModel(this.box.size[0] * this.box.size[1]);
-        return (this.shared.model ??= freshModel(this.shared.area));
+        if (!(this.flags & SHARED)) return freshModel(this.box.size[0] * this.box.size[1], this.flags);
+        return (this.shared.model ??= freshModel(this.shared.area, this.flags));
     }
 
     private readSlices(d: RangeDecoder, level: number): Packet {
@@ -939,7 +951,7 @@ class Structure {
             return { below: slice(below), above: from, mode: estimated[order] === w ? 6 : 7 };
         }
         const both = below !== undefined && above !== undefined;
-        const mode = both ? modeOfGap(Math.min(w - below, above - w)) : below === undefined && above === undefined ? 0 : 1;
+        const mode = both ? modeOfGap(Math.min(w - below, above - w), false) : below === undefined && above === undefined ? 0 : 1;
         return { below: slice(below), above: slice(above), mode };
     }
 }
@@ -963,8 +975,8 @@ class Pyramid {
     }
 
     private startModel(): OccupancyModel {
-        if (!(this.flags & SHARED)) return freshModel(this.box.size[0] * this.box.size[1]);
-        return (this.shared.model ??= freshModel(this.shared.area));
+        if (!(this.flags & SHARED)) return freshModel(this.box.size[0] * this.box.size[1], this.flags);
+        return (this.shared.model ??= freshModel(this.shared.area, this.flags));
     }
 
     /** Halves the stride of an axis: old samples go to even numbers. */

@@ -1,0 +1,246 @@
+/* Tubes side by side and within each other, straight, oblique, parting, ending: whatever fits together in every slice makes a closed
+ * surface that does not cross itself; what goes on alone is made of strips. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "mesh.h"
+#include "mesh_shading.h"
+#include "radius_trace.h"
+
+enum { SIZE = 120, MOST_ROWS = 40 };
+static const double FULL_TURN = 6.283185307179586;
+static lathe_arena arena, mesh_arena[2];
+
+static uint32_t seed = 11;
+static double uniform(double low, double high) {
+    seed = seed * 1664525u + 1013904223u;
+    return low + (high - low) * (seed >> 8) / (1 << 24);
+}
+static int32_t whole(int32_t low, int32_t high) { return (int32_t)floor(uniform(low, high + 1)); }
+
+static lathe_radii new_radii(int32_t slices, uint32_t level_count) {
+    lathe_radii radii = {.slices = slices, .width = SIZE, .height = SIZE, .level_count = level_count};
+    radii.tubes = LATHE_NEW(&arena, lathe_radius_tube, LATHE_TUBES_MOST);
+    if (!radii.tubes) abort();
+    memset(radii.tubes, 0, LATHE_TUBES_MOST * sizeof *radii.tubes);
+    return radii;
+}
+
+typedef struct shape {
+    double x, y, dx, dy;       /* centre, and how it moves from slice to slice */
+    double radius, long_side;  /* ellipse: half axes are radius and radius * long_side */
+    double bumps, grow;        /* share of the radius; from slice to slice */
+} shape;
+
+static void add_tube(lathe_radii *radii, int32_t first, int32_t rows, uint32_t rays, bool hole, int32_t turn, const shape *s) {
+    lathe_radius_tube *t = &radii->tubes[radii->count++];
+    t->first = first;
+    t->hole = hole;
+    t->map = (lathe_radius_map){.slices = rows, .rays = rays, .level_count = lathe__tube_passes(rows, radii->level_count), .tube = true, .turn = turn,
+                                .apex = {4, 4}, .farthest = 2 * SIZE * LATHE_RADIUS_ONE};
+    t->passes = t->map.level_count;
+    t->map.radius = LATHE_NEW(&arena, int32_t, (size_t)rows * rays);
+    t->map.centre = lathe__arena_alloc(&arena, (size_t)rows, sizeof *t->map.centre);
+    if (!t->map.radius || !t->map.centre) abort();
+    for (int32_t row = 0; row < rows; row++) {
+        t->map.centre[row][0] = (int32_t)lround(2 * (s->x + row * s->dx));
+        t->map.centre[row][1] = (int32_t)lround(2 * (s->y + row * s->dy));
+        for (uint32_t i = 0; i < rays; i++) {
+            double a = FULL_TURN * i / rays, r = s->radius * s->long_side / hypot(cos(a), s->long_side * sin(a));
+            r *= (1 + s->bumps * sin(5 * a + row * 0.3)) * (1 + s->grow * row);
+            t->map.radius[(size_t)row * rays + i] = (int32_t)lround(fmax(r, 0.25) * LATHE_RADIUS_ONE);
+        }
+    }
+}
+
+static bool fits(lathe_radii *radii, uint32_t level) {
+    int32_t *slices;
+    uint32_t count, stride;
+    bool good = true;
+    if (lathe__radii_slices(&slices, &count, &stride, &mesh_arena[0], radii, level)) abort();
+    for (uint32_t i = 0; good && i < count; i++) {
+        lathe_outline outline;
+        if (lathe__radii_outline(&outline, &mesh_arena[0], radii, level, slices[i], stride, i)) abort();
+        good = lathe__loops_fit(&outline);
+    }
+    lathe__arena_reset(&mesh_arena[0]);
+    return good;
+}
+
+static lathe_mesh build(lathe_radii *radii, uint32_t level) {
+    lathe_surface_counts counts = {0};
+    lathe_mesh mesh = {0};
+    uint32_t shown;
+    CHECK(!lathe__radii_mesh(&mesh, mesh_arena, radii, level, &counts, &shown));
+    return mesh;
+}
+
+static bool is_sound(const lathe_mesh *mesh, lathe_mesh_report *r) {
+    if (lathe__mesh_check(r, mesh, true)) return false;
+    return !r->boundary_edges && !r->nonmanifold_edges && !r->misoriented_edges && !r->nonmanifold_vertices && !r->degenerate_triangles &&
+           !r->duplicate_positions && !r->self_intersections && !r->unused_vertices && !r->bad_indices;
+}
+
+/* Six times the volume in voxels. */
+static double volume(const lathe_mesh *m) {
+    double sum = 0, one = LATHE_LATTICE_ONE;
+    for (uint32_t i = 0; i < m->triangle_count; i++) {
+        const int32_t *a = m->lattice[m->triangles[i][0]], *b = m->lattice[m->triangles[i][1]], *c = m->lattice[m->triangles[i][2]];
+        double p[3] = {a[0] / one, a[1] / one, a[2] / one}, q[3] = {b[0] / one, b[1] / one, b[2] / one}, s[3] = {c[0] / one, c[1] / one, c[2] / one};
+        sum += p[0] * (q[1] * s[2] - q[2] * s[1]) + p[1] * (q[2] * s[0] - q[0] * s[2]) + p[2] * (q[0] * s[1] - q[1] * s[0]);
+    }
+    return sum / 6;
+}
+
+/* A closed bottle within a thick column, and a column beside it: topology and volume are known, all but the ends is strips. */
+static void known(void) {
+    lathe_radii radii = new_radii(30, 3);
+    add_tube(&radii, 0, 30, 64, false, 0, &(shape){40, 60, 0, 0, 20, 1, 0, 0});
+    add_tube(&radii, 8, 12, 32, true, 0, &(shape){42, 58, 0.2, 0, 8, 1, 0, 0});
+    add_tube(&radii, 5, 20, 32, false, 0, &(shape){90, 60, 0, 0.3, 15, 1, 0, 0});
+    lathe_mesh_report r;
+    lathe_mesh mesh = build(&radii, 2);
+    CHECK(is_sound(&mesh, &r));
+    CHECK_EQ(r.components, 3);
+    CHECK_EQ(r.euler, 6);
+    /* Caps are about half a slice thick. */
+    double pi = FULL_TURN / 2, wanted = pi * (20 * 20 * 30 - 8 * 8 * 12 + 15 * 15 * 20);
+    CHECK(fabs(volume(&mesh) - wanted) < 0.02 * wanted);
+    uint32_t rings = 30 * 64 + 12 * 32 + 20 * 32, strips = 2 * (29 * 64 + 11 * 32 + 19 * 32);
+    CHECK(mesh.vertex_count > rings && mesh.vertex_count < rings + 2 * (64 + 32 + 32));
+    CHECK(mesh.triangle_count > strips && mesh.triangle_count < strips + 6 * (64 + 32 + 32));
+    /* Rays go straight up, where the overlay's jitter is not: the middle of the column. */
+    for (uint32_t i = 0; i < 64; i++) CHECK(mesh.lattice[2 * 64 + i][0] == mesh.lattice[3 * 64 + i][0]);
+    lathe_mesh_free(&mesh);
+    lathe__arena_reset(&arena);
+}
+
+/* A hole that opens at both ends, and one that turns with the column around it. */
+static void pipes(void) {
+    for (int32_t turn = 0; turn <= 600; turn += 600) {
+        lathe_radii radii = new_radii(20, 3);
+        add_tube(&radii, 0, 20, 64, false, turn, &(shape){60, 60, 0, 0, 30, 1.5, 0, 0});
+        add_tube(&radii, 0, 20, 32, true, turn, &(shape){60, 60, 0, 0, 10, 1.2, 0, 0});
+        lathe_mesh_report r;
+        for (uint32_t level = 0; level < 3; level++) {
+            lathe_mesh mesh = build(&radii, level);
+            CHECK(is_sound(&mesh, &r));
+            CHECK_EQ(r.components, 1);
+            CHECK_EQ(r.euler, 0);
+            lathe_mesh_free(&mesh);
+        }
+        lathe__arena_reset(&arena);
+    }
+}
+
+static void random_tubes(lathe_radii *radii) {
+    int32_t slices = radii->slices;
+    shape trunk = {60, 60, uniform(-0.2, 0.2), uniform(-0.2, 0.2), uniform(20, 45), uniform(0.5, 1.2), uniform(0, 0.2), uniform(-0.01, 0.01)};
+    add_tube(radii, 0, slices, 128, false, 0, &trunk);
+    int32_t more = whole(1, 4);
+    for (int32_t i = 0; i < more && radii->count < LATHE_TUBES_MOST; i++) {
+        bool hole = uniform(0, 1) < 0.8;
+        int32_t first = whole(0, slices - 2), rows = whole(1, slices - first);
+        shape s = {uniform(hole ? 30 : 0, hole ? 90 : 119), uniform(hole ? 30 : 0, hole ? 90 : 119), uniform(-0.5, 0.5), uniform(-0.5, 0.5), uniform(0.5, 12), uniform(0.6, 1.5), uniform(0, 0.3),
+                   uniform(-0.02, 0.03)};
+        add_tube(radii, first, rows, 8u << whole(0, 4), hole, 0, &s);
+        /* Half of them part into two, or go on as another one. */
+        if (radii->count + 2 > LATHE_TUBES_MOST || first + rows + 2 > slices || uniform(0, 1) < 0.5) continue;
+        for (int k = -1; k <= 1; k += 2) {
+            shape part = {s.x + rows * s.dx + k * s.radius * 0.5, s.y + rows * s.dy, k * uniform(0, 0.6), 0, s.radius * 0.4, 1, 0, 0};
+            add_tube(radii, first + rows, whole(1, slices - first - rows), 16, hole, 0, &part);
+        }
+    }
+}
+
+static void random_sets(void) {
+    int tried = 0, made = 0;
+    for (int i = 0; i < 2500 && made < 150; i++, tried++) {
+        lathe_radii radii = new_radii(whole(3, MOST_ROWS), 3);
+        random_tubes(&radii);
+        for (uint32_t level = 0; level < 3; level++) {
+            if (!fits(&radii, level)) continue;
+            lathe_mesh mesh = build(&radii, level);
+            lathe_mesh_report r;
+            CHECK(is_sound(&mesh, &r));
+            CHECK(volume(&mesh) > 0);
+            lathe_mesh_free(&mesh);
+            made++;
+        }
+        lathe__arena_reset(&arena);
+    }
+    CHECK(made >= 100);
+}
+
+/* ---- what a renderer takes ---- */
+
+static void cross(double *out, const float *a, const float *b, const float *c) {
+    for (int i = 0; i < 3; i++) {
+        int j = (i + 1) % 3, k = (i + 2) % 3;
+        out[i] = (double)(b[j] - a[j]) * (c[k] - a[k]) - (double)(b[k] - a[k]) * (c[j] - a[j]);
+    }
+}
+
+/* Against the definition, triangle by triangle. */
+static void check_shading(const lathe_mesh *mesh, const lathe_transform *transform, lathe_mesh_shading *s) {
+    float *positions = malloc(mesh->vertex_count * 12 + 1);
+    uint32_t *indices = malloc(mesh->triangle_count * 12 + 1);
+    double *sums = calloc(mesh->vertex_count + 1, 24), worst = 0;
+    lathe_mesh_positions(mesh, transform, positions);
+    lathe_mesh_indices(mesh, transform, indices);
+    if (!CHECK(!lathe__mesh_shade(s, mesh, transform))) return;
+    CHECK(!memcmp(s->positions, positions, mesh->vertex_count * 12));
+    CHECK(!memcmp(s->indices, indices, mesh->triangle_count * 12));
+    for (uint32_t t = 0; t < mesh->triangle_count; t++) {
+        const uint32_t *v = indices + 3 * (size_t)t;
+        double n[3];
+        cross(n, positions + 3 * (size_t)v[0], positions + 3 * (size_t)v[1], positions + 3 * (size_t)v[2]);
+        for (int k = 0; k < 9; k++) sums[3 * (size_t)v[k / 3] + k % 3] += n[k % 3];
+    }
+    for (uint32_t i = 0; i < mesh->vertex_count; i++) {
+        const double *n = sums + 3 * (size_t)i;
+        double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+        for (int k = 0; k < 3; k++) worst = fmax(worst, fabs(n[k] / length - s->normals[3 * (size_t)i + k]));
+    }
+    CHECK(worst < 1e-3);
+    free(positions);
+    free(indices);
+    free(sums);
+}
+
+static void shading(void) {
+    lathe_mesh_shading s = {0};
+    lathe_transform plain = {{{1 / 65536.0, 0, 0, 5}, {0, 1 / 65536.0, 0, -3}, {0, 0, 2 / 65536.0, 7}}}, mirrored = plain;
+    mirrored.m[0][0] *= -1;
+    mirrored.m[1][2] = 1e-6;
+    for (int i = 0; i < 2; i++) {
+        lathe_radii radii = new_radii(20, 3);
+        add_tube(&radii, 0, 20, 64, false, 0, &(shape){60, 60, 0.5, 0, 30, 1.5, 0.1, 0});
+        add_tube(&radii, i, 19, 32, true, 0, &(shape){60, 60, 0, 0, 10, 1.2, 0.1, 0});
+        if (i) radii.count = 1;   /* strips and fans alone */
+        lathe_mesh mesh = build(&radii, 2);
+        check_shading(&mesh, &plain, &s);
+        check_shading(&mesh, &mirrored, &s);
+        lathe_mesh_free(&mesh);
+    }
+    /* Two triangles back to back, one that is alone, a vertex without any. */
+    int32_t lattice[5][3] = {{0, 0, 0}, {65536, 0, 0}, {0, 65536, 0}, {0, 0, 65536}, {1, 1, 1}};
+    uint32_t triangles[3][3] = {{0, 1, 2}, {0, 2, 1}, {0, 1, 3}};
+    lathe_mesh odd = {5, 3, lattice, triangles};
+    CHECK(!lathe__mesh_shade(&s, &odd, &plain));
+    CHECK(s.normals[3 * 4] == 0 && s.normals[3 * 4 + 1] == 0 && s.normals[3 * 4 + 2] == 0);
+    CHECK(s.normals[3 * 3 + 1] < -0.999f);
+    lathe__mesh_shading_free(&s);
+    lathe__arena_reset(&arena);
+}
+
+int main(void) {
+    known();
+    pipes();
+    random_sets();
+    shading();
+    lathe__arena_free(&arena);
+    for (int i = 0; i < 2; i++) lathe__arena_free(&mesh_arena[i]);
+    return check_end();
+}
