@@ -10,8 +10,11 @@
 
 /* In voxels. A level is close that is at most this far off by RMS and anywhere; the last one must be closer. */
 static const double CLOSE_RMS = 0.239, CLOSE_MAX = 3, MOST_RMS = 0.22, MOST_MAX = 1.0;
+/* A slice between two that a close level shows comes early if anything in that gap is farther off by the estimate, which sees too much
+ * where a surface is oblique: points this far off along their ray are nearer than MOST_MAX as a rule. */
+static const double EARLY_MAX = 1.2;
 /* A level's error against the one before it, by the estimate. */
-static const double STILL = 1.005;
+static const double STILL = 1.05;
 /* Of the bytes that slices cost. */
 static const double MOST_BYTES = 0.9;
 /* Eighths of a step that each pass has below the next. */
@@ -70,7 +73,7 @@ static int32_t estimate_turn(const lathe_radius_map *map) {
 
 /* ---- trying ---- */
 
-enum { FINEST_STEP = 10, FINE_STEP = 20, COARSE_STEP = 52 };
+enum { FINEST_STEP = 10, FINE_STEP = 20, USUAL_STEP = 30, COARSE_STEP = 52 };
 
 typedef struct trial {
     lathe_radii truth;
@@ -270,7 +273,7 @@ enum { MANY = 8000 };          /* coded radii: to measure a second level of so m
  * now, nor does a small shape, of which a second level is looked at anyway: a single tube's error at the limit, squared, is about so much
  * of its estimate's square. What is chosen in the end has been measured. */
 static lathe_status look_at(bool *close, bool *sure, const outcome *fine, trial *t, uint32_t level, bool last) {
-    static const double FAR_BELOW = 0.7, CLEARLY = 0.95, SMALL = 0.75;
+    static const double FAR_BELOW = 0.7, CLEARLY = 0.98, SMALL = 0.75;
     bool small = !last && samples_of(&t->truth) <= MANY;
     double one_tube = (1 - 1 / SMALL) * CLOSE_RMS * CLOSE_RMS;
     lathe_status status = LATHE_OK;
@@ -335,6 +338,84 @@ static lathe_status choose_step(uint32_t *level, trial *t) {
     set_steps(&t->truth, best.step, 0, 0);
     *level = best.level;
     return status ? status : best.step ? LATHE_OK : LATHE_ERR_EMPTY;
+}
+
+/* ---- rays against slices ---- */
+
+static void set_ahead(lathe_radii *truth, uint32_t ahead) {
+    for (uint32_t i = 0; i < truth->count; i++) truth->tubes[i].map.ahead = ahead;
+}
+
+/* What a level costs that is about close, at a step that is usual for it; it need not be known if it is clearly more than least. */
+static lathe_status try_ahead(double *cost, trial *t, uint32_t ahead, double least) {
+    enum { RECORD = 21 };
+    static const double NEARLY = 1.3, CLEARLY_MORE = 1.1;
+    lathe_radii coded = frame_of(t);
+    double rms = INFINITY, most;
+    size_t sum = 0;
+    lathe_status status = LATHE_OK;
+    *cost = INFINITY;
+    set_ahead(&t->truth, ahead);
+    set_steps(&t->truth, USUAL_STEP, 0, 0);
+    lathe__arena_reset(&t->arena[0]);
+    for (uint32_t level = 0; level < t->truth.level_count && rms > CLOSE_RMS; level++) {
+        status = add_bytes(&sum, &coded, t, level);
+        sum += RECORD;
+        if (status || (double)sum >= CLEARLY_MORE * least) break;
+        status = lathe__estimate_error(&rms, &most, &t->estimate, &t->arena[1], &coded, level);
+        if (status) break;
+        rms *= t->pixel;
+        double far = rms / CLOSE_RMS;
+        if (far <= NEARLY) *cost = fmin(*cost, (double)sum * (far > 1 ? far : sqrt(far)));   /* the step will be another one */
+    }
+    return status;
+}
+
+/* Rays as dense as slices, denser, or all of them before any slice between the ends: what twists or is the same all along. */
+static lathe_status choose_ahead(trial *t) {
+    static const uint32_t AHEAD[] = {0, LATHE_RADIUS_MOST_AHEAD, 1};
+    static const double CLEARLY = 0.96;
+    enum { EVERY = 5 };
+    lathe_status status = LATHE_OK;
+    double least = INFINITY, cost;
+    uint32_t best = 0;
+    t->estimate.every = EVERY;
+    for (size_t i = 0; !status && i < sizeof AHEAD / sizeof *AHEAD; i++) {
+        status = try_ahead(&cost, t, AHEAD[i], least);
+        if (cost < CLEARLY * least) least = cost, best = AHEAD[i];
+    }
+    t->estimate.every = 1;
+    set_ahead(&t->truth, best);
+    return status;
+}
+
+/* The slices that come early because something beside them is farther off than limit, pixels; how many. */
+static int32_t mark_early(trial *t, uint32_t level, double limit) {
+    lathe_radii *truth = &t->truth;
+    int32_t half = (int32_t)1 << (truth->level_count - 2 - level), count = 0;
+    memset(truth->early, 0, (size_t)truth->slices * sizeof *truth->early);
+    for (uint32_t i = 0; i < truth->count; i++)
+        for (int32_t row = 0, last = truth->tubes[i].map.slices - 1; row < last; row++) {
+            if (t->estimate.tubes[i].worst[row] <= limit) continue;
+            truth->early[truth->tubes[i].first + row / half * half] = true;
+            if (row % half && row / half * half + half < last) truth->early[truth->tubes[i].first + row / half * half + half] = true;
+        }
+    for (int32_t w = 0; w < truth->slices; w++) count += truth->early[w];
+    return count;
+}
+
+/* What sticks out between two slices of the close level is shown with it. Where that is all over the place, only the worst. */
+static lathe_status choose_early(trial *t, uint32_t level) {
+    static const double FEWER = 1.25;
+    outcome o;
+    if (level + 1 >= t->truth.level_count) return LATHE_OK;
+    lathe_status status = try_steps(&o, t, level, level);
+    if (status || o.most[level] <= EARLY_MAX) return status;
+    int32_t count, most = (t->truth.slices >> (t->truth.level_count - 1 - level)) / 8 + 1;
+    double limit = EARLY_MAX / t->pixel;
+    while ((count = mark_early(t, level, limit)) > most) limit *= FEWER;
+    t->truth.early_level = count ? level + 1 : 0;
+    return LATHE_OK;
 }
 
 /* The step of the levels behind the close one: as coarse as errors then keep falling, down to what the last level may have. */
@@ -490,7 +571,9 @@ static lathe_status choose(trial *t, const lathe_structure_state *state) {
     uint32_t level;
     size_t bytes = 0;
     bool good = true;
-    lathe_status status = choose_step(&level, t);
+    lathe_status status = choose_ahead(t);
+    if (!status) status = choose_step(&level, t);
+    if (!status) status = choose_early(t, level);
     if (!status) status = choose_fine_step(t, level);
     if (!status) status = check_levels(&bytes, t, state);
     if (!status) status = earns_its_place(&good, bytes, t, state);
@@ -514,7 +597,8 @@ lathe_status lathe__choose_radii(lathe_baked_structure *out, lathe_structure_sta
     t.samples = t.borders < 4000 ? 400 : t.borders < 15000 ? t.borders / 10 : 1500;
     lathe_traced_tubes traced;
     lathe_arena loops = {0};
-    lathe_status status = lathe__radius_trace(&traced, &loops, &state->mask, state->fraction);
+    t.truth.early = LATHE_NEW(&state->arena, bool, t.truth.slices);
+    lathe_status status = t.truth.early ? lathe__radius_trace(&traced, &loops, &state->mask, state->fraction) : LATHE_ERR_MEMORY;
     if (!status) status = fit_maps(&t, state, &arena[0], &traced, source, mm[frame[2]] / pixel);
     lathe__arena_free(&loops);
     lathe_reference *own = NULL;

@@ -41,7 +41,7 @@ static void start_row(lathe_radius_estimate *out, const lathe_estimate_tube *tub
 }
 
 lathe_status lathe__estimate_start(lathe_radius_estimate *out, lathe_arena *arena, const lathe_radii *truth, double slice) {
-    *out = (lathe_radius_estimate){.truth = truth, .slice = slice};
+    *out = (lathe_radius_estimate){.truth = truth, .slice = slice, .every = 1};
     for (uint32_t i = 0; i < truth->count; i++) {
         const lathe_radius_map *m = &truth->tubes[i].map;
         lathe_estimate_tube *tube = &out->tubes[i];
@@ -49,7 +49,8 @@ lathe_status lathe__estimate_start(lathe_radius_estimate *out, lathe_arena *aren
         tube->facing = LATHE_NEW(arena, float, samples);
         tube->share = LATHE_NEW(arena, float, samples);
         tube->direction = LATHE_NEW(arena, float, 2 * (size_t)m->rays);
-        if (!tube->facing || !tube->share || !tube->direction) return LATHE_ERR_MEMORY;
+        tube->worst = LATHE_NEW(arena, float, m->slices);
+        if (!tube->facing || !tube->share || !tube->direction || !tube->worst) return LATHE_ERR_MEMORY;
         for (uint32_t ray = 0; ray < m->rays; ray++) {
             tube->direction[ray] = (float)cos(FULL_TURN * ray / m->rays);
             tube->direction[ray + m->rays] = (float)sin(FULL_TURN * ray / m->rays);
@@ -162,11 +163,14 @@ static void add_row(sums *s, const chords *c, int32_t row, int32_t low, int32_t 
             d = fabsf(d);
             most[k] = d > most[k] ? d : most[k];
         }
+    float worst = 0;
     for (int k = 0; k < SIDE; k++) {
         sum += (double)square[k];
-        s->most = fmax(s->most, (double)most[k]);
+        worst = fmaxf(worst, most[k]);
     }
     s->square += sum;
+    s->most = fmax(s->most, (double)worst);
+    c->tube->worst[row] = worst / LATHE_RADIUS_ONE;
 }
 
 static lathe_status add_tube(sums *s, const lathe_radius_estimate *e, lathe_arena *scratch, lathe_radii *radii, uint32_t index, uint32_t level,
@@ -188,7 +192,8 @@ static lathe_status add_tube(sums *s, const lathe_radius_estimate *e, lathe_aren
     int32_t end = c.shown.slices - 1;
     for (uint32_t i = 0; i < count; i++) {   /* an end of a tube is shown */
         int32_t low = slices[i] - tube->first, high = i + 1 < count ? slices[i + 1] - tube->first : low + 1;
-        for (int32_t row = low; row < high && low >= 0 && row <= end; row++) add_row(s, &c, row, low, row > low ? high : low);
+        for (int32_t row = low; row < high && low >= 0 && row <= end; row++)
+            if (row % e->every == 0) add_row(s, &c, row, low, row > low ? high : low);
     }
     return LATHE_OK;
 }
@@ -200,7 +205,7 @@ lathe_status lathe__estimate_error(double *rms, double *most, const lathe_radius
     sums s = {0};
     lathe_status status = lathe__radii_slices(&slices, &count, &stride, scratch, radii, level);
     for (uint32_t i = 0; !status && i < radii->count; i++) status = add_tube(&s, e, scratch, radii, i, level, slices, count, stride);
-    *rms = e->shares > 0 ? sqrt(s.square / e->shares) / LATHE_RADIUS_ONE : 0;
+    *rms = e->shares > 0 ? sqrt(s.square * e->every / e->shares) / LATHE_RADIUS_ONE : 0;
     *most = s.most / LATHE_RADIUS_ONE;
     lathe__arena_reset(scratch);
     return status;

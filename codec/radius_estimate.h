@@ -7,11 +7,13 @@ typedef struct lathe_estimate_tube {
     float *facing;             /* of each sample: cosine between its ray and the surface's normal */
     float *share;              /* of each sample: of the surface, in any unit */
     float *direction;          /* of each ray, before its row's turn: all cosines, then all sines */
+    float *worst;              /* of each row: its largest error at the level that was estimated last, pixels */
 } lathe_estimate_tube;
 
 typedef struct lathe_radius_estimate {
     const lathe_radii *truth;
     double slice;              /* distance of two slices, pixels */
+    int32_t every;             /* only so manieth rows are looked at */
     double shares;             /* of all samples */
     lathe_estimate_tube tubes[LATHE_TUBES_MOST];
 } lathe_radius_estimate;

@@ -37,8 +37,8 @@ lathe_status lathe__radius_map_start(lathe_radius_map *map, lathe_arena *arena) 
 }
 
 uint32_t lathe__radius_ray_stride(const lathe_radius_map *map, uint32_t level) {
-    uint32_t stride = (uint32_t)1 << (map->level_count - 1 - level);
-    return map->rays / stride < 8 ? map->rays / 8 : stride;
+    uint32_t stride = (uint32_t)1 << (map->level_count - 1 - level) >> map->ahead;
+    return !stride ? 1 : map->rays / stride < 8 ? map->rays / 8 : stride;
 }
 
 int32_t lathe__centre_between(int32_t low, int32_t at_low, int32_t high, int32_t at_high, int32_t row) {
@@ -226,32 +226,57 @@ static bool code_new_rays(walk *w, int32_t row, int32_t before, bool fresh, uint
     return code_row(w, 2, row, stride, 2 * stride);
 }
 
+static int32_t fallen(const lathe_radius_map *map, int32_t step) { return step > 3 ? (int32_t)((int64_t)step * map->fall / 8) : step; }
+
 static int32_t step_of(const lathe_radius_map *map, uint32_t level) {
     int32_t step = map->fine_step && level >= map->fine_from ? map->fine_step : map->step;
-    for (uint32_t l = level; l + 1 < map->level_count; l++) step = step > 3 ? (int32_t)((int64_t)step * map->fall / 8) : step;
+    for (uint32_t l = level; l + 1 < map->level_count; l++) step = fallen(map, step);
     return step;
 }
 
 static bool is_wanted(const lathe_radius_map *map, int32_t row) { return !ENCODES || !map->wanted || map->wanted[row]; }
 
+static bool is_early(const lathe_radius_map *map, uint32_t with, int32_t row) {
+    return map->early && map->early_with == with && map->early[row];
+}
+
+/* The rows that a level puts between those of the one below; early: only those that come with the level below, else the others. */
+static bool code_rows_between(walk *w, uint32_t level, bool early) {
+    const lathe_radius_map *map = w->map;
+    int32_t stride = (int32_t)1 << (map->level_count - 1 - level);
+    uint32_t rays = lathe__radius_ray_stride(map, level - 1);
+    for (int32_t row = stride; row < map->slices - 1; row += 2 * stride)
+        if (is_early(map, level - 1, row) == early && is_wanted(map, row) && !code_new_row(w, row, stride, rays)) return false;
+    return true;
+}
+
+/* The same of rays. An early row looks at no other: the one below need not be there yet. */
+static bool code_rays_between(walk *w, uint32_t level, bool early) {
+    const lathe_radius_map *map = w->map;
+    int32_t stride = (int32_t)1 << (map->level_count - 1 - level), last = map->slices - 1;
+    uint32_t rays = lathe__radius_ray_stride(map, level);
+    if (lathe__radius_ray_stride(map, level - 1) == rays) return true;
+    for (int32_t row = 0, before = -1;; before = row, row = row + stride < last ? row + stride : last) {
+        bool fresh = row % (2 * stride) && row != last;
+        if (is_early(map, level - 1, row) == early && is_wanted(map, row) && !code_new_rays(w, row, early ? -1 : before, fresh, rays)) return false;
+        if (row == last) return true;
+    }
+}
+
+static bool code_first_rows(const walk *w) {
+    int32_t stride = (int32_t)1 << (w->map->level_count - 1), last = w->map->slices - 1;
+    for (int32_t row = 0, before = -1;; before = row, row = row + stride < last ? row + stride : last) {
+        if (!code_first_row(w, row, before, lathe__radius_ray_stride(w->map, 0))) return false;
+        if (row == last) return true;
+    }
+}
+
 lathe_status lathe__radius_walk(lathe_radius_map *map, uint32_t level, const lathe_number_coder *coder) {
     walk w;
     w.map = map, w.coder = coder, w.step = step_of(map, level), w.mask = map->rays - 1;
-    int32_t stride = (int32_t)1 << (map->level_count - 1 - level), last = map->slices - 1;
-    uint32_t rays = lathe__radius_ray_stride(map, level);
-    if (level == 0) {
-        for (int32_t row = 0, before = -1;; before = row, row = row + stride < last ? row + stride : last) {
-            if (!code_first_row(&w, row, before, rays)) return LATHE_ERR_FORMAT;
-            if (row == last) return LATHE_OK;
-        }
-    }
-    uint32_t known = lathe__radius_ray_stride(map, level - 1);
-    for (int32_t row = stride; row < last; row += 2 * stride)
-        if (is_wanted(map, row) && !code_new_row(&w, row, stride, known)) return LATHE_ERR_FORMAT;
-    if (known == rays) return LATHE_OK;
-    for (int32_t row = 0, before = -1;; before = row, row = row + stride < last ? row + stride : last) {
-        bool fresh = row % (2 * stride) && row != last;
-        if (is_wanted(map, row) && !code_new_rays(&w, row, before, fresh, rays)) return LATHE_ERR_FORMAT;
-        if (row == last) return LATHE_OK;
-    }
+    bool good = level ? code_rows_between(&w, level, false) && code_rays_between(&w, level, false) : code_first_rows(&w);
+    if (!good || !map->early || map->early_with != level) return good ? LATHE_OK : LATHE_ERR_FORMAT;
+    w.step = fallen(map, w.step);
+    good = code_rows_between(&w, level + 1, true) && code_rays_between(&w, level + 1, true);
+    return good ? LATHE_OK : LATHE_ERR_FORMAT;
 }

@@ -10,7 +10,8 @@ enum {
     LATHE_RADIUS_ONE = 64,     /* radius units in a voxel */
     LATHE_RADIUS_LEAST = 16,   /* no radius is smaller: neighbouring crossings stay apart */
     LATHE_RADIUS_MAX_RAYS = 1024, LATHE_RADIUS_CLASSES = 9, LATHE_RADIUS_KINDS = 3,
-    LATHE_APEX_ONE = 8
+    LATHE_APEX_ONE = 8,
+    LATHE_RADIUS_MOST_AHEAD = 12
 };
 
 typedef struct lathe_radius_models {
@@ -26,6 +27,9 @@ typedef struct lathe_radius_map {
     uint32_t fine_from;        /* from this level on, steps fall towards lower ones from another one: */
     int32_t fine_step;         /* 0: there is no such level */
     bool tube;                 /* not a simple map: */
+    uint32_t ahead;            /* rays are as dense as they would be so many levels later */
+    const bool *early;         /* of each row: level early_with codes it already, if the next one would as a new row; NULL: none */
+    uint32_t early_with;
     int32_t start[3];          /* what the first centre and the first radius are predicted to be */
     int32_t turn;              /* of a slice's rays against those of the slice below, 1/65536 of a full turn, counter-clockwise */
     int32_t apex[2];           /* how far the caps rise below the first and above the last slice, 1/8 of a slice: 1 to 7 */

@@ -47,11 +47,12 @@ lathe_status lathe__radii_outline(lathe_outline *out, lathe_arena *arena, lathe_
     return LATHE_OK;
 }
 
-/* Every stride-th slice and the last; of each tube the ends, and slices 1, 2, 4, ... from them: ends are round more often than not. */
-static void mark_slices(bool *shown, const lathe_radii *radii, int32_t stride) {
+/* Every stride-th slice and the last; early ones, if asked for; of each tube the ends, and slices 1, 2, 4, ... from them: ends are round more often than not. */
+static void mark_slices(bool *shown, const lathe_radii *radii, int32_t stride, bool early) {
     memset(shown, 0, (size_t)radii->slices * sizeof *shown);
     for (int32_t w = 0; w < radii->slices; w += stride) shown[w] = true;
     shown[radii->slices - 1] = true;
+    for (int32_t w = 0; early && w < radii->slices; w++) shown[w] |= radii->early[w];
     for (uint32_t i = 0; i < radii->count; i++) {
         int32_t first = radii->tubes[i].first, last = first + radii->tubes[i].map.slices - 1;
         shown[first] = shown[last] = true;
@@ -66,12 +67,13 @@ lathe_status lathe__radii_slices(int32_t **out, uint32_t *count, uint32_t *ray_s
     bool *mark = LATHE_NEW(arena, bool, radii->slices);
     uint32_t n = 0;
     if (!mark || !slices) return LATHE_ERR_MEMORY;
-    mark_slices(mark, radii, stride);
+    mark_slices(mark, radii, stride, radii->early_level && radii->early_level == level + 1);
     for (int32_t w = 0; w < radii->slices; w++)
         if (mark[w]) slices[n++] = w;
     *out = slices;
     *count = n;
-    *ray_stride = stride > 1 ? (uint32_t)stride / 2 : 1;
+    uint32_t rays = (uint32_t)stride / 2 >> radii->tubes[0].map.ahead;
+    *ray_stride = rays ? rays : 1;
     return LATHE_OK;
 }
 

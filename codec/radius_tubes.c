@@ -2,8 +2,9 @@
 #include <string.h>
 
 /* Numbers of the head, each kind with its own context. */
-enum { HEAD_FORM, HEAD_COUNT, HEAD_STEP, HEAD_FALL, HEAD_FINE, HEAD_TURN, HEAD_APEX, HEAD_FIRST, HEAD_ROWS, HEAD_RAYS, HEAD_HOLE, HEAD_KINDS };
-enum { FORM_TUBES = 5, USUAL_STEP = 32, USUAL_FALL = 6, USUAL_LOG_RAYS = 6, MOST_SAMPLES = 1 << 22, MOST_STEP = 1 << 16 };
+enum { HEAD_FORM, HEAD_COUNT, HEAD_STEP, HEAD_FALL, HEAD_FINE, HEAD_TURN, HEAD_APEX, HEAD_FIRST, HEAD_ROWS, HEAD_RAYS, HEAD_HOLE, HEAD_AHEAD, HEAD_EARLY,
+       HEAD_GAP, HEAD_KINDS };
+enum { FORM_TUBES = 5, FORM_TUBES_MORE = 6, USUAL_STEP = 32, USUAL_FALL = 6, USUAL_LOG_RAYS = 6, MOST_SAMPLES = 1 << 22, MOST_STEP = 1 << 16 };
 
 typedef struct head {
     lathe_radii *radii;
@@ -11,6 +12,7 @@ typedef struct head {
     lathe_number_coder coder;
     lathe_number_model models[HEAD_KINDS];
     lathe_radius_map common;   /* what all tubes share */
+    bool more;                 /* FORM_TUBES_MORE */
 } head;
 
 static void start_number(lathe_number_model *m, uint32_t not_zero, uint32_t longer) {
@@ -73,6 +75,8 @@ static lathe_status code_tube(head *h, uint32_t index) {
     tube->map.level_count = lathe__tube_passes(rows, radii->level_count);
     tube->map.rays = (uint32_t)1 << log_rays;
     tube->map.fine_from = tube->map.level_count - radii->level_count + radii->fine_level;
+    tube->map.early = radii->early_level ? radii->early + tube->first : NULL;
+    tube->map.early_with = tube->map.level_count - radii->level_count + radii->early_level - 1;
     return LATHE_OK;
 }
 
@@ -84,6 +88,38 @@ static lathe_status allocate(lathe_radius_tube *tube, lathe_arena *arena, lathe_
     tube->shown = LATHE_NEW(arena, int32_t, samples);
     tube->shown_centre = lathe__arena_alloc(arena, (size_t)tube->map.slices, sizeof *tube->shown_centre);
     return status ? status : tube->shown && tube->shown_centre ? LATHE_OK : LATHE_ERR_MEMORY;
+}
+
+static int32_t next_early(const lathe_radii *radii, int32_t slice) {
+    while (slice < radii->slices && !radii->early[slice]) slice++;
+    return slice < radii->slices ? slice : -1;
+}
+
+/* Ascending; each as what it is above the one before, at first above -1; 0 ends the list. */
+static lathe_status code_early(head *h, lathe_arena *arena) {
+    lathe_radii *radii = h->radii;
+    const lathe_radii *t = h->truth;
+    int32_t level = number(h, HEAD_EARLY, 0, t ? (int32_t)t->early_level : 0), slice = -1;
+    if (level < 0 || level >= (int32_t)radii->level_count) return LATHE_ERR_FORMAT;
+    radii->early_level = (uint32_t)level;
+    if (!level) return LATHE_OK;
+    radii->early = LATHE_NEW(arena, bool, radii->slices);
+    if (!radii->early) return LATHE_ERR_MEMORY;
+    memset(radii->early, 0, (size_t)radii->slices * sizeof *radii->early);
+    for (;;) {
+        int32_t next = t ? next_early(t, slice + 1) : 0, gap = number(h, HEAD_GAP, 0, t && next >= 0 ? next - slice : 0);
+        if (!gap) return LATHE_OK;
+        if (gap < 0 || gap >= radii->slices - slice) return LATHE_ERR_FORMAT;
+        radii->early[slice += gap] = true;
+    }
+}
+
+static lathe_status code_more(head *h, lathe_arena *arena) {
+    const lathe_radius_map *truth = h->truth ? &h->truth->tubes[0].map : NULL;
+    int32_t ahead = number(h, HEAD_AHEAD, 0, truth ? (int32_t)truth->ahead : 0);
+    if (ahead < 0 || ahead > LATHE_RADIUS_MOST_AHEAD) return LATHE_ERR_FORMAT;
+    h->common.ahead = (uint32_t)ahead;
+    return code_early(h, arena);
 }
 
 static lathe_status start_tubes(head *h, lathe_arena *arena) {
@@ -109,6 +145,8 @@ static lathe_status start_tubes(head *h, lathe_arena *arena) {
     radii->fine_step = radii->step - finer;
     common->fine_step = fine ? lathe__tube_step(radii->fine_step) : 0;
     common->farthest = (radii->width + radii->height) * LATHE_RADIUS_ONE;
+    lathe_status more = h->more ? code_more(h, arena) : LATHE_OK;
+    if (more) return more;
     radii->count = (uint32_t)count;
     for (uint32_t i = 0; i < radii->count; i++) {
         lathe_status status = code_tube(h, i);
@@ -124,14 +162,21 @@ static lathe_status start_tubes(head *h, lathe_arena *arena) {
     return LATHE_OK;
 }
 
+static int32_t form_of(const lathe_radii *truth) {
+    const lathe_radius_map *map = &truth->tubes[0].map;
+    if (truth->simple) return __builtin_ctz(map->rays) - 6;
+    return map->ahead || truth->early_level ? FORM_TUBES_MORE : FORM_TUBES;
+}
+
 static lathe_status code_head(lathe_radii *radii, const lathe_radii *truth, lathe_arena *arena, lathe_number_code *code, void *coder) {
     head h = {.radii = radii, .truth = truth, .coder = {code, coder, NULL}};
     for (int k = 0; k < HEAD_KINDS; k++) start_number(&h.models[k], 128, 128);
     radii->tubes = LATHE_NEW(arena, lathe_radius_tube, LATHE_TUBES_MOST);
     if (!radii->tubes) return LATHE_ERR_MEMORY;
     memset(radii->tubes, 0, LATHE_TUBES_MOST * sizeof *radii->tubes);
-    int32_t form = number(&h, HEAD_FORM, 0, !truth ? 0 : truth->simple ? __builtin_ctz(truth->tubes[0].map.rays) - 6 : FORM_TUBES);
-    radii->simple = form != FORM_TUBES;
+    int32_t form = number(&h, HEAD_FORM, 0, truth ? form_of(truth) : 0);
+    h.more = form == FORM_TUBES_MORE;
+    radii->simple = form != FORM_TUBES && !h.more;
     radii->count = 1;
     return radii->simple ? start_simple(&h, arena, form) : start_tubes(&h, arena);
 }

@@ -23,6 +23,8 @@ typedef struct lathe_radii {
     uint32_t count;
     int32_t step, fine_step;   /* index: lathe__tube_step; all tubes have these, and turn, fall and apex of the first */
     uint32_t fine_level;       /* the first one with fine_step; 0: none */
+    uint32_t early_level;      /* the level after that with early slices; 0: none */
+    bool *early;               /* of each slice: its rows come with that level, if they would be new rows of the next one; NULL: none */
     lathe_radius_tube *tubes;
 } lathe_radii;
 

@@ -339,6 +339,68 @@ static void forks(void) {
     lathe__arena_reset(&arena);
 }
 
+/* Rays ahead of slices change when a radius is coded and from what it is predicted, not how near to the truth it comes; early slices hold
+ * what they have been coded with to the end. */
+static void ahead_and_early(void) {
+    static const uint32_t AHEAD[] = {1, 3, LATHE_RADIUS_MOST_AHEAD};
+    lathe_mask mask;
+    lathe_traced_tubes traced;
+    fill_fork(&mask);
+    if (!CHECK(!lathe__radius_trace(&traced, &arena, &mask, 32))) return;
+    for (int i = 0; i < 6; i++) {
+        lathe_radii truth;
+        bool early[FORKED];
+        start_truth(&truth, &mask, &traced, 24, i & 1 ? 2 : 0);
+        for (int w = 0; w < FORKED; w++) early[w] = next_random() % 3 == 0;
+        for (uint32_t k = 0; k < truth.count; k++) truth.tubes[k].map.ahead = AHEAD[i / 2];
+        truth.early = early;
+        truth.early_level = (uint32_t)i % truth.level_count;
+        fork_trip(&truth);
+    }
+    lathe__mask_free(&mask);
+    lathe__arena_reset(&arena);
+}
+
+/* What the map of one tube knows at a level; radii of the last level: truth, everything within 0.6 of the last step. */
+static void early_rows_are_near(void) {
+    enum { ROWS = 33, LEVELS = 4, EARLY = 13, RAYS = 32 };
+    bool early[ROWS] = {0};
+    lathe_radius_tube tube = {.map = {.slices = ROWS, .level_count = lathe__tube_passes(ROWS, LEVELS), .rays = RAYS, .fall = 6,
+                                      .apex = {4, 4}, .farthest = 1 << 14}};
+    lathe_radii truth = {.slices = ROWS, .width = 100, .height = 100, .level_count = LEVELS, .count = 1, .step = 24, .fine_step = 24,
+                         .early_level = 2, .early = early, .tubes = &tube};
+    lathe_radii coded = {.slices = ROWS, .width = 100, .height = 100, .level_count = LEVELS};
+    int32_t *slices;
+    uint32_t count, stride;
+    if (lathe__radius_map_start(&tube.map, &arena)) abort();
+    for (int32_t row = 0; row < ROWS; row++) {
+        tube.map.centre[row][0] = tube.map.centre[row][1] = 99;
+        for (int32_t i = 0; i < RAYS; i++) tube.map.radius[row * RAYS + i] = row == EARLY || row == EARLY + 1 ? 600 + 30 * (i & 3) : 1200;
+    }
+    early[EARLY - 1] = early[EARLY + 1] = true;   /* of level 1, whose slices are 4 apart: 12 is one, 14 would be new at level 2 */
+    for (uint32_t level = 0; level < LEVELS; level++) {
+        lathe_range_encoder e;
+        lathe__encoder_start(&e);
+        CHECK(!lathe__radii_code(&coded, &truth, &arena, level, put, &e));
+        lathe__encoder_free(&e);
+        CHECK(!lathe__radii_slices(&slices, &count, &stride, &scratch, &coded, level));
+        bool shown = false;
+        for (uint32_t k = 0; k < count; k++) shown |= slices[k] == EARLY + 1;
+        CHECK_EQ(shown, level > 0);
+        lathe_radius_map map = lathe__tube_shown(&coded.tubes[0], lathe__passes_at(&coded, &coded.tubes[0], level));
+        int32_t worst = 0;
+        for (int32_t i = 0; i < RAYS; i += 2) {
+            int32_t miss = abs(map.radius[(EARLY + 1) * RAYS + i] - tube.map.radius[(EARLY + 1) * RAYS + i]);
+            if (miss > worst) worst = miss;
+        }
+        /* With level 1 every second ray of the row is known, to 0.6 of a step that has fallen twice; before that it is smooth. */
+        if (level) CHECK(worst <= lathe__tube_step(24) * 9 / 16 * 3 / 5 + 1);
+        else CHECK(worst > 400);
+        lathe__arena_reset(&scratch);
+    }
+    lathe__arena_reset(&arena);
+}
+
 /* Two squares, the second a hole or not: half sides a and b, the second's centre shifted. */
 static bool squares_fit(int32_t a, int32_t b, int32_t shift, bool hole) {
     lathe_point points[8];
@@ -426,7 +488,7 @@ static void too_many(void) {
 static int32_t wild(void *coder, lathe_number_model *model, int32_t number) {
     int *count = coder;
     (void)model, (void)number;
-    if (!(*count)++) return 5;   /* tubes */
+    if (!(*count)++) return 5 + (int32_t)(next_random() & 1);   /* tubes; tubes with more in the head */
     if (*count < 40) return next_random() % 4 ? 0 : (int32_t)(next_random() % 6) - 1;
     return next_random() % 3 ? 0 : next_random() % 20 ? (int32_t)(next_random() % 41) - 20 : (int32_t)(next_random() % (1 << 20)) - (1 << 19);
 }
@@ -488,6 +550,8 @@ int main(void) {
     follows();
     tubes();
     forks();
+    ahead_and_early();
+    early_rows_are_near();
     too_many();
     loops_fit();
     random_loops_fit();

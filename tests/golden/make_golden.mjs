@@ -130,4 +130,16 @@ const vessel = (x, y, z) => {
 };
 bake('tubes', raw('tubes', [46, 46, 44], (x, y, z) => Math.min(trunk(x, y, z), -Math.min(vessel(x, y, z), z - 7, 36 - z))), '--iso', '0');
 bake('tube', raw('tube', [36, 38, 33], (x, y, z) => cone(x, y, z) + 0.4), '--iso', '0');
+/* Rays ahead of slices: all of them, and once more; slices that come early because of a notch, in a tube alone and beside others. */
+const bars = (x, y, turn) => {
+    const [p, q] = [Math.cos(turn) * x + Math.sin(turn) * y, Math.cos(turn) * y - Math.sin(turn) * x].map(Math.abs);
+    return Math.max(Math.min(4 - p, 16 - q), Math.min(4 - q, 16 - p));
+};
+const dented = (x, y, z) => 24 - Math.hypot(x, y, z) - 6 * Math.exp(-(((z - 5) / 1.2) ** 2) - (Math.atan2(y, x) / 0.2) ** 2);
+const rod = (x, y, z) => Math.min(4 - Math.hypot(x, y), z - 9, 40 - z);
+bake('ahead', raw('ahead', [40, 40, 48], (x, y, z) => Math.min(bars(x - 19.3, y - 19.6, z * 0.05), z - 2.4, 45.2 - z)), '--iso', '0');
+bake('ahead_tubes', raw('ahead_tubes', [60, 60, 60], (x, y, z) => Math.max(Math.min(13 + 6 * Math.cos(2 * Math.atan2(y - 30, x - 24)) - Math.hypot(y - 30, x - 24),
+    z - 3, 56 - z), rod(x - 52, y - 30, z))), '--iso', '0');
+bake('early', raw('early', [56, 56, 56], (x, y, z) => dented(x - 27, y - 28, z - 27)), '--iso', '0');
+bake('early_tubes', raw('early_tubes', [70, 56, 56], (x, y, z) => Math.max(dented(x - 27, y - 28, z - 27), rod(x - 60, y - 30, z))), '--iso', '0');
 rmSync(scratch, { recursive: true });

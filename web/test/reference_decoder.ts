@@ -599,16 +599,17 @@ class RadiusImage {
     radii: Int32Array[];
     private magnitudes: Uint8Array[];
 
-    /** start: of a tube, what its first centre and radius are predicted to be. */
+    /** start: of a tube, what its first centre and radius are predicted to be. early: which rows a pass codes before their time. */
     constructor(readonly slices: number, readonly passes: number, readonly rays: number, private readonly contexts: RadiusContexts,
-        private readonly farthest: number, private readonly start: { centre: Point; radius: number } | null) {
+        private readonly farthest: number, private readonly start: { centre: Point; radius: number } | null, private readonly ahead = 0,
+        private readonly early: { pass: number; rows: Set<number> } | null = null) {
         this.centres = Array.from({ length: slices }, () => [0, 0]);
         this.radii = this.centres.map(() => new Int32Array(rays));
         this.magnitudes = this.centres.map(() => new Uint8Array(rays));
     }
 
     copy(): RadiusImage {
-        const to = new RadiusImage(this.slices, this.passes, this.rays, this.contexts, this.farthest, this.start);
+        const to = new RadiusImage(this.slices, this.passes, this.rays, this.contexts, this.farthest, this.start, this.ahead, this.early);
         to.centres = this.centres.map(([u, v]) => [u, v]);
         to.radii = this.radii.map((r) => r.slice());
         to.magnitudes = this.magnitudes.map((m) => m.slice());
@@ -617,23 +618,29 @@ class RadiusImage {
 
     get last(): number { return this.slices - 1; }
     stride(pass: number): number { return 2 ** (this.passes - 1 - pass); }
-    rayStride(pass: number): number { return Math.min(this.stride(pass), this.rays / 8); }
+    rayStride(pass: number): number { return Math.min(Math.max(Math.floor(this.stride(pass) / 2 ** this.ahead), 1), this.rays / 8); }
     rows(pass: number): number[] {
         const stride = this.stride(pass), rows: number[] = [];
         for (let row = 0; row < this.last; row += stride) rows.push(row);
         return [...rows, this.last];
     }
 
-    /** The numbers of one pass; without a decoder all are 0. */
-    read(d: RangeDecoder | null, pass: number, step: number): void {
+    /** The numbers of one pass; without a decoder all are 0. earlyStep: that of the rows which come before their time. */
+    read(d: RangeDecoder | null, pass: number, step: number, earlyStep: number): void {
         if (pass === 0) this.rows(0).forEach((row, i, all) => this.firstRow(d, step, row, i ? all[i - 1] : -1));
-        else {
-            const s = this.stride(pass), known = this.rayStride(pass - 1), rays = this.rayStride(pass);
-            for (let row = s; row < this.last; row += 2 * s) this.newRow(d, step, row, s, known);
-            if (rays < known) this.rows(pass).forEach((row, i, all) =>
-                this.newRays(d, step, row, i ? all[i - 1] : -1, row % (2 * s) !== 0 && row !== this.last, rays));
-        }
+        else this.between(d, pass, step, false);
+        if (this.early && this.early.pass === pass) this.between(d, pass + 1, earlyStep, true);
         d?.present();
+    }
+
+    /** A pass's new rows and rays: of its early rows or of the others. */
+    private between(d: RangeDecoder | null, pass: number, step: number, early: boolean): void {
+        const s = this.stride(pass), known = this.rayStride(pass - 1), rays = this.rayStride(pass);
+        const wanted = (row: number): boolean => (this.early !== null && this.early.pass === pass - 1 && this.early.rows.has(row)) === early;
+        for (let row = s; row < this.last; row += 2 * s) if (wanted(row)) this.newRow(d, step, row, s, known);
+        if (rays < known) this.rows(pass).forEach((row, i, all) => {
+            if (wanted(row)) this.newRays(d, step, row, i && !early ? all[i - 1] : -1, row % (2 * s) !== 0 && row !== this.last, rays);
+        });
     }
 
     private centre(d: RangeDecoder | null, row: number, predicted: Point, context = this.contexts.centre): void {
@@ -722,7 +729,7 @@ export class SimpleMap {
         this.image = new RadiusImage(plan.slices, plan.levelCount, 2 ** log, new RadiusContexts(), farthest, null);
     }
 
-    read(d: RangeDecoder, level: number): void { this.image.read(d, level, fallen(this.step, this.image.passes - 1 - level, 6)); }
+    read(d: RangeDecoder, level: number): void { this.image.read(d, level, fallen(this.step, this.image.passes - 1 - level, 6), 0); }
 }
 
 export interface Tube { first: number; rows: number; rays: number; hole: boolean; image: RadiusImage | null }
@@ -737,11 +744,15 @@ export class Tubes {
     readonly fine: number;
     readonly turn: number;
     readonly apex: number[];
+    readonly ahead: number = 0;
+    /** The level that has early slices, or -1; and those. */
+    readonly earlyLevel: number = -1;
+    readonly early: number[] = [];
     readonly tubes: Tube[] = [];
     private readonly contexts = new RadiusContexts();
     private readonly kinds = new Map<string, NumberContext>();
 
-    constructor(d: RangeDecoder, private readonly plan: Plan, private readonly box: number[]) {
+    constructor(d: RangeDecoder, more: boolean, private readonly plan: Plan, private readonly box: number[]) {
         const number = (kind: string): number => {
             if (!this.kinds.has(kind)) this.kinds.set(kind, new NumberContext(2));
             return (this.kinds.get(kind) as NumberContext).read(d);
@@ -760,6 +771,14 @@ export class Tubes {
         this.steps = [k, fine];
         this.turn = within(number('turn'), -32768, 32768, 'the turn');
         this.apex = [0, 1].map(() => within(4 + number('apex'), 1, 7, 'an apex'));
+        if (more) {
+            this.ahead = within(number('ahead'), 0, 12, 'how far rays are ahead');
+            this.earlyLevel = within(number('early'), 0, plan.levelCount - 1, 'the level of early slices') - 1;
+            for (let slice = -1, gap = 1; this.earlyLevel >= 0 && gap;) {
+                gap = within(number('gap'), 0, plan.slices - 1 - slice, 'an early slice');
+                if (gap) this.early.push((slice += gap));
+            }
+        }
         let log = 6, samples = 0;
         for (let i = 0; i < count; i++) {
             const before = this.tubes[i - 1], n = within(number('first'), 0, plan.slices, 'where a tube begins');
@@ -790,10 +809,13 @@ export class Tubes {
     read(d: RangeDecoder, level: number): void {
         this.tubes.forEach((tube, i) => {
             const passes = this.passes(tube), last = passes - this.plan.levelCount + level;
-            tube.image ??= new RadiusImage(tube.rows, passes, tube.rays, this.contexts, 64 * (this.box[0] + this.box[1]), this.startOf(i));
+            const early = this.earlyLevel < 0 ? null :
+                { pass: passes - this.plan.levelCount + this.earlyLevel, rows: new Set(this.early.map((w) => w - tube.first)) };
+            tube.image ??= new RadiusImage(tube.rows, passes, tube.rays, this.contexts, 64 * (this.box[0] + this.box[1]), this.startOf(i), this.ahead, early);
             for (let pass = level ? last : 0; pass <= last; pass++) {
                 const fine = this.fine > 0 && pass >= passes - this.plan.levelCount + this.fine;
-                tube.image.read(d, pass, fallen(fine ? this.fineStep : this.step, passes - 1 - pass, this.fall));
+                const step = fallen(fine ? this.fineStep : this.step, passes - 1 - pass, this.fall);
+                tube.image.read(d, pass, step, fallen(step, 1, this.fall));
             }
         });
     }
@@ -801,7 +823,7 @@ export class Tubes {
     /** All rows and rays, those to come predicted. */
     shown(tube: Tube, level: number): RadiusImage {
         const image = (tube.image as RadiusImage).copy(), passes = image.passes;
-        for (let pass = passes - this.plan.levelCount + level + 1; pass < passes; pass++) image.read(null, pass, 1);
+        for (let pass = passes - this.plan.levelCount + level + 1; pass < passes; pass++) image.read(null, pass, 1, 1);
         return image;
     }
 
@@ -810,7 +832,7 @@ export class Tubes {
 
     strideAt(level: number): number { return this.plan.stride(level); }
     shownSlices(level: number): number[] {
-        const s = this.plan.stride(level), slices = new Set<number>([this.plan.slices - 1]);
+        const s = this.plan.stride(level), slices = new Set<number>([this.plan.slices - 1, ...(level === this.earlyLevel ? this.early : [])]);
         for (let w = 0; w < this.plan.slices; w += s) slices.add(w);
         for (const { first, rows } of this.tubes) {
             const last = first + rows - 1;
@@ -830,7 +852,7 @@ export function radiusMesh(packet: Packet & { kind: 'radii' }, level: number): M
     const { map } = packet;
     if (map instanceof SimpleMap) return stripMesh(map.image, map.turn, map.apex, map.image.rows(level), map.image.rayStride(level));
     if (!map.single) return null;
-    const s = map.shownSlices(level), rays = map.tubes[0].rays, stride = Math.max(map.strideAt(level) / 2, 1);
+    const s = map.shownSlices(level), rays = map.tubes[0].rays, stride = Math.max(Math.floor(map.strideAt(level) / 2 / 2 ** map.ahead), 1);
     return stripMesh(map.shown(map.tubes[0], level), map.turn, map.apex, s, Math.min(stride, rays / 8));
 }
 
@@ -890,7 +912,7 @@ class Structure {
         const d = new RangeDecoder(payload, record), level = ++this.level;
         if (level === 0 && !(this.flags & EXACT) && d.bit(8192)) {
             const m = new NumberContext(2), number = m.read(d), [width, height] = this.box.size;
-            this.map = number === 5 ? new Tubes(d, this.plan, this.box.size) : new SimpleMap(d, m, 6 + number, this.plan, 64 * (width + height));
+            this.map = number === 5 || number === 6 ? new Tubes(d, number === 6, this.plan, this.box.size) : new SimpleMap(d, m, 6 + number, this.plan, 64 * (width + height));
         }
         if (this.map) {
             this.map.read(d, level);
