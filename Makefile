@@ -30,7 +30,7 @@ FUZZERS := $(basename $(notdir $(wildcard tests/fuzz_*.c)))
 
 # The decoder. Linking it proves that it needs no volume, no ray casting on grey values and no file.
 WASM_SOURCES := $(addprefix core/,status.c arena.c ray.c crossing.c contour.c grammar.c tiling.c centre.c grid.c outline.c triangulate.c \
-                  overlay.c tube.c builder.c level.c refinement.c mask.c mesh.c) \
+                  overlay.c tube.c builder.c cube_table.c raster_surface.c level.c refinement.c mask.c mesh.c) \
                 $(addprefix codec/,range_decoder.c occupancy_model.c model_state.c occupancy_decode.c base_shape.c base_decode.c radius_map.c radius_mesh.c \
                   radius_tubes.c radius_stack.c structure_state.c structure_decode.c pyramid.c pyramid_decode.c archive_parse.c crc32c.c decode.c) \
                 $(wildcard web/wasm/*.c)
@@ -126,7 +126,7 @@ WASM_BUILTINS = $(firstword $(shell find -L $$($(CLANG) -print-resource-dir)/lib
 wasm: $(WASM) $(RASTERS) ## the decoder as wasm: build/wasm/lathe.wasm; of rasters alone: build/wasm/rasters.wasm
 web: $(VIEWER) $(DRACO_PAGE) ## the viewer page: web/dist/viewer.html; the page of the Draco deltas
 
-HOT := $(addsuffix %,$(addprefix codec/,occupancy_ range_ pyramid radius_m) $(addprefix core/,triangulate grid overlay outline centre crossing))
+HOT := $(addsuffix %,$(addprefix codec/,occupancy_ range_ pyramid radius_m) $(addprefix core/,raster_surface triangulate grid overlay outline centre crossing))
 # Where the time goes: 1.6 kB more, a fifth faster.
 $(foreach dir,build/wasm build/wasm/rasters,$(patsubst %.c,$(dir)/%.o,$(filter $(HOT),$(WASM_SOURCES)))): WASM_OPTIMISE := -O2 -fno-unroll-loops
 

@@ -79,9 +79,11 @@ enum { LATHE_NUMBER_ZERO, LATHE_NUMBER_WHOLE, LATHE_NUMBER_FLOAT, LATHE_NUMBER_D
 
 /* Bits of parameter 1; parameter 0 is the fraction of border edges. SHARED: structures are coded one after the other by one model,
  * and none can be decoded alone. EXACT: every structure has slices, none is a radius map. PYRAMID: levels are rasters (pyramid.h).
- * SURE: of a pyramid: pixels that are nearly certain are coded by a small context alone (occupancy.h). */
+ * SURE: of a pyramid: pixels that are nearly certain are coded by a small context alone (occupancy.h).
+ * CUBES: of a pyramid: its surface is made cube by cube (raster_surface.h). */
 enum {
-    LATHE_FLAG_CAPS = 1, LATHE_FLAG_KEEP = 2, LATHE_FLAG_SHARED = 4, LATHE_FLAG_EXACT = 8, LATHE_FLAG_PYRAMID = 16, LATHE_FLAG_SURE = 32
+    LATHE_FLAG_CAPS = 1, LATHE_FLAG_KEEP = 2, LATHE_FLAG_SHARED = 4, LATHE_FLAG_EXACT = 8, LATHE_FLAG_PYRAMID = 16, LATHE_FLAG_SURE = 32,
+    LATHE_FLAG_CUBES = 64
 };
 
 typedef struct lathe_header {

@@ -114,29 +114,34 @@ static lathe_encode_source source_of(bake *b, grey_values *grey, const lathe_mas
                                  .context = grey, .iso = b->options->iso};
 }
 
-/* Where the grey values cross iso on border edges, on average: one number for the whole structure. Rows and columns of every few
- * slices are enough. */
-static int mean_fraction(const bake *b, const lathe_mask *mask) {
+/* Where the grey values cross iso between neighbouring voxels, on average, within slices or (upright) from slice to slice: one number for
+ * the whole structure. Every few slices are enough. */
+static int mean_fraction(const bake *b, const lathe_mask *mask, bool upright) {
     if (b->boundary == LATHE_BOUNDARY_EDGE) return LATHE_FRACTION_ONE / 2;
     int32_t frame[3], every = mask->size[2] / 24 + 1;
+    size_t words = (size_t)mask->row_words, slice_words = lathe__mask_slice_words(mask);
     lathe__axis_frame(b->options->axis, frame);
     double sum = 0;
     size_t count = 0;
-    for (int32_t w = 0; w < mask->size[2]; w += every) {
-        const uint64_t *slice = lathe__mask_slice(mask, w);
-        for (int32_t v = 0; v + 1 < mask->size[1]; v++)
-            for (int32_t i = 0; i < mask->row_words * 2; i++) {
-                /* Even i: border edges along the row; odd: between this row and the next. */
-                const uint64_t *row = slice + (size_t)v * (size_t)mask->row_words + i / 2;
-                uint64_t next = i & 1 ? row[mask->row_words] : row[0] >> 1 | (i / 2 + 1 < mask->row_words ? row[1] << 63 : 0);
-                for (uint64_t change = row[0] ^ next; change; change &= change - 1) {
-                    int32_t u = i / 2 * 64 + __builtin_ctzll(change);
-                    float p = value_at(b, frame, mask->origin[0] + u, mask->origin[1] + v, mask->origin[2] + w);
-                    float q = value_at(b, frame, mask->origin[0] + u + !(i & 1), mask->origin[1] + v + (i & 1), mask->origin[2] + w);
+    for (int32_t w = -upright; w < mask->size[2]; w += every) {
+        for (size_t i = 0; i < slice_words; i++) {
+            uint64_t here = w < 0 ? 0 : lathe__mask_slice(mask, w)[i];
+            for (int axis = upright ? 2 : 0; axis < (upright ? 3 : 2); axis++) {
+                int32_t u0 = (int32_t)(i % words) * 64, v = (int32_t)(i / words);
+                uint64_t next = 0;
+                if (axis == 0) next = here >> 1 | (i % words + 1 < words ? lathe__mask_slice(mask, w)[i + 1] << 63 : 0);
+                else if (axis == 1) next = v + 1 < mask->size[1] ? lathe__mask_slice(mask, w)[i + words] : here;
+                else if (w + 1 < mask->size[2]) next = lathe__mask_slice(mask, w + 1)[i];
+                for (uint64_t change = here ^ next; change; change &= change - 1) {
+                    int32_t u = u0 + __builtin_ctzll(change);
+                    const int32_t *o = mask->origin;
+                    float p = value_at(b, frame, o[0] + u, o[1] + v, o[2] + w);
+                    float q = value_at(b, frame, o[0] + u + (axis == 0), o[1] + v + (axis == 1), o[2] + w + (axis == 2));
                     double inside = p >= q ? p : q, outside = p >= q ? q : p;
                     if (inside > outside) { sum += (inside - b->options->iso) / (inside - outside); count++; }
                 }
             }
+        }
     }
     int fraction = count ? (int)(sum / (double)count * LATHE_FRACTION_ONE + 0.5) : LATHE_FRACTION_ONE / 2;
     return fraction < 8 ? 8 : fraction > 56 ? 56 : fraction;
@@ -219,7 +224,7 @@ static lathe_status extract_structure(bake *b, size_t index) {
     lathe_status status = extract(b, index, &state->mask);
     if (status) return explain(b, index, "its region", status);
     state->level = -1;
-    state->fraction = mean_fraction(b, &state->mask);
+    state->fraction = mean_fraction(b, &state->mask, false);
     if (!b->options->structure_count) b->header.parameters[0] = (uint32_t)state->fraction;
     state->flags = b->header.parameters[1];
     memcpy(h->origin, state->mask.origin, sizeof h->origin);
@@ -263,13 +268,16 @@ static void schedule(bake *b) {
 
 static lathe_status plan_pyramid(bake *b) {
     lathe_status status = LATHE_OK;
-    b->header.parameters[1] |= LATHE_FLAG_PYRAMID | LATHE_FLAG_SURE;
+    b->header.parameters[1] = (b->header.parameters[1] & ~(uint32_t)LATHE_FLAG_CAPS) | LATHE_FLAG_PYRAMID | LATHE_FLAG_SURE |
+                              LATHE_FLAG_CUBES;
     schedule(b);
     for (size_t i = 0; i < b->count; i++) b->header.structures[i].level_count = (uint8_t)(b->header.parameter_count - 1);
     status = lathe__pyramid_read(&b->pyramid, &b->header);
     for (size_t i = 0; !status && i < b->count; i++) {
         b->states[i].pyramid = &b->pyramid;
         b->states[i].flags = b->header.parameters[1];
+        b->states[i].upright = mean_fraction(b, &b->states[i].mask, true);
+        if (!b->options->structure_count) b->header.parameters[0] |= (uint32_t)b->states[i].upright << 6;
         b->baked[i].level_count = b->pyramid.level_count;
         b->states[i].plan.slices = b->states[i].mask.size[2];
         b->states[i].plan.level_count = b->pyramid.level_count;
@@ -295,7 +303,8 @@ static lathe_status plan_radii(bake *b) {
         return explain(b, 0, "planning", status);
     }
     state->pyramid = NULL;
-    state->flags = b->header.parameters[1] &= ~(uint32_t)(LATHE_FLAG_PYRAMID | LATHE_FLAG_SURE);
+    b->header.parameters[0] = (uint32_t)state->fraction;
+    state->flags = b->header.parameters[1] &= ~(uint32_t)(LATHE_FLAG_PYRAMID | LATHE_FLAG_SURE | LATHE_FLAG_CUBES);
     b->header.parameter_count = b->header.parameters[1] ? 2 : 1;
     b->header.structures[0].level_count = (uint8_t)baked->level_count;
     return LATHE_OK;

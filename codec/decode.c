@@ -104,6 +104,7 @@ static lathe_status start_structures(lathe_decoder *d) {
         s->mask.row_words = (h->size[0] + 63) / 64;
         s->plan = (lathe_level_plan){.slices = h->size[2], .level_count = h->level_count};
         s->fraction = d->header.parameter_count ? (int)(d->header.parameters[0] & 63) : LATHE_FRACTION_ONE / 2;
+        s->upright = d->header.parameter_count ? (int)(d->header.parameters[0] >> 6 & 63) : 0;
         s->flags = lathe__header_flags(&d->header);
         s->pyramid = pyramid ? &d->pyramid : NULL;
         s->level = -1;
@@ -124,7 +125,7 @@ static lathe_status next_packet(lathe_decoder *d, const uint8_t **payload, uint3
     if (!d->has_header) {
         lathe_status status = lathe__header_parse(&d->header, &reader);
         if (status) return reading(d, &reader, status);
-        bool strange = LATHE_RASTERS_ONLY && !(lathe__header_flags(&d->header) & LATHE_FLAG_PYRAMID);
+        bool strange = LATHE_RASTERS_ONLY && ~lathe__header_flags(&d->header) & (LATHE_FLAG_PYRAMID | LATHE_FLAG_CUBES);
         status = strange ? LATHE_ERR_FORMAT : start_structures(d);
         if (status) return fail(d, status, strange ? "the model is not made of rasters: the whole decoder reads it" : LATHE_FAULT("header"));
         d->has_header = true;

@@ -1,5 +1,5 @@
-/* Where the vertices between slices lie: where two outlines cross or in the middle of a diagonal, both of which the client finds by
- * itself. */
+/* Where the vertices between slices lie: where two outlines cross or in the middle of a diagonal, or of a raster's surface over a sample:
+ * all of these the client finds by itself. */
 #include "draco_place.h"
 #include <math.h>
 #include <stdlib.h>
@@ -83,6 +83,40 @@ static void list_candidates(const lathe_draco_walk *w, uint32_t x, between *b) {
         }
 }
 
+typedef struct lines { uint32_t count[2]; int32_t at[2][2 * MOST_NEIGHBOURS], near[2][2 * MOST_NEIGHBOURS]; } lines;
+
+static void add_lines(lines *l, const int32_t at[2]) {
+    for (int k = 0; k < 2; k++) {
+        uint32_t i = 0;
+        while (i < l->count[k] && l->at[k][i] != at[k]) i++;
+        if (i == l->count[k]) l->at[k][i] = at[k], l->near[k][l->count[k]++] = 0;
+        l->near[k][i]++;
+    }
+}
+
+/* Over a sample run two lines on which neighbours lie, too, or fourth corners of parallelograms of such vertices: the more do, the likelier it is. */
+static void list_samples(const lathe_draco_walk *w, uint32_t x, between *b) {
+    lines l = {{0, 0}, {{0}}, {{0}}};
+    const uint32_t *corners = w->c->triangles;
+    for (uint32_t i = w->first[x]; i < w->first[x + 1] && i < w->first[x] + MOST_NEIGHBOURS; i++) {
+        uint32_t base = w->corner[i] - w->corner[i] % 3, next = base + (w->corner[i] + 1) % 3, y = corners[next], z = corners[base + (w->corner[i] + 2) % 3];
+        uint32_t beyond = w->twin[next], far = corners[beyond - beyond % 3 + (beyond + 2) % 3];
+        if (w->id[y] == LATHE_DRACO_NONE) continue;
+        add_lines(&l, at_of(w, y));
+        if (!(w->half[y] & w->half[z] & w->half[far] & 1) || w->id[z] == LATHE_DRACO_NONE || w->id[far] == LATHE_DRACO_NONE) continue;
+        const int32_t *p = at_of(w, y), *q = at_of(w, z), *r = at_of(w, far);
+        add_lines(&l, (int32_t[]){p[0] + q[0] - r[0], p[1] + q[1] - r[1]});
+    }
+    for (uint32_t i = 0; i < l.count[0]; i++)
+        for (uint32_t k = 0; k < l.count[1]; k++) {
+            candidate c = {.at = {l.at[0][i], l.at[1][k]}, .length = -l.near[0][i] - l.near[1][k]};
+            bool full = b->candidate_count == MOST_CANDIDATES;
+            if (full && b->candidate[MOST_CANDIDATES - 1].length <= c.length) continue;
+            b->candidate_count -= full;
+            add_candidate(b, c);
+        }
+}
+
 static int32_t candidate_of(int32_t value) { return value >> 10; }
 static int32_t rise_of(int32_t value) { return (value & 1023) - 512; }
 
@@ -144,7 +178,8 @@ void lathe__place_between(lathe_draco_walk *w, uint32_t x) {
     between b = {0};
     if (!w->mesh->parts[w->part[x]].height_count) { lathe__walk_fail(w, LATHE_ERR_FORMAT); return; }
     gather(w, x, &b);
-    list_candidates(w, x, &b);
+    if (w->mesh->parts[w->part[x]].samples) list_samples(w, x, &b);
+    else list_candidates(w, x, &b);
     int32_t grain = lathe__walk_grain(w, x), *symbol = &w->c->value[1][x], value = -1;
     int32_t rise = w->truth ? (int32_t)lround((double)(w->truth->exact[x][2] - b.height * UNIT) / (grain * UNIT)) : 0;
     uint64_t key = b.key;

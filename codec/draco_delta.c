@@ -354,6 +354,7 @@ static lathe_status shape_of(lathe_draco_shape *shape, const lathe_structure_sta
     lathe__arena_free(&arena);
     if (!status && state->radii) status = take_rings(shape, state->radii, state->mask.origin, level, ray_stride);
     for (int k = 0; k < 2 && state->pyramid && !state->radii; k++) shape->stride[k] = state->stride[k];
+    shape->samples = state->pyramid && !state->radii && state->flags & LATHE_FLAG_CUBES;
     return status;
 }
 

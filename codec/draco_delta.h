@@ -35,6 +35,7 @@ typedef struct lathe_draco_part {
     int32_t *heights;          /* of the shown slices, half voxels, ascending */
     uint32_t (*triangles)[3];  /* counter-clockwise in world space */
     uint32_t *contour;         /* the vertices in shown slices, by slice, then by number */
+    bool samples;              /* vertices between slices lie over samples */
     uint32_t grain_log;        /* log2 of the unit of its steps, moves and rises, in eighths of a voxel edge */
     lathe_draco_rings rings;   /* of the latest delta */
     lathe_draco_rings form;    /* a delta's tubes, with rays and direction alone; none: it is no radius map */
@@ -65,6 +66,7 @@ typedef struct lathe_draco_shape {
     int32_t *heights;          /* of the shown slices, half voxels, ascending; owned */
     int32_t origin[2];         /* voxel of the box's pixel (0, 0) */
     int32_t stride[2];         /* along u, v, if the surface is that of a lattice of samples origin + k stride; 0: it is not */
+    bool samples;              /* and vertices between slices lie over samples */
     int32_t before[2];         /* the same at the level before; 0: its vertices stay where they are */
     lathe_draco_rings rings;   /* of a radius map: slice by slice, then tube by tube, they are the mesh's first vertices; owned */
     int32_t turn;

@@ -101,15 +101,18 @@ static uint32_t list_runs(int32_t (*runs)[3], const int32_t *fresh, uint32_t cou
     return n;
 }
 
-/* How a structure's vertices are told: by steps of some grain, or as rings. */
+static uint32_t form_of(const lathe_draco_part *p) { return p->grain_log + (p->samples ? LATHE_FORM_SAMPLES : 0); }
+
+/* How a structure's vertices are told: by steps of some grain, also over samples, or as rings. */
 static void code_form(lathe_draco_walk *w, uint32_t part, bool told, uint32_t form) {
     lathe_draco_part *p = &w->mesh->parts[part];
-    form = told ? lathe__walk_number(w, form) : p->grain_log;
+    form = told ? lathe__walk_number(w, form) : form_of(p);
     lathe__draco_rings_free(&p->form);
-    if (form > LATHE_FORM_RINGS) lathe__walk_fail(w, LATHE_ERR_FORMAT);
+    if (form >= LATHE_FORM_SAMPLES + LATHE_FORM_RINGS) lathe__walk_fail(w, LATHE_ERR_FORMAT);
     else if (form == LATHE_FORM_RINGS) lathe__walk_ring_form(w, part);
     else {
-        p->grain_log = form;
+        p->samples = form >= LATHE_FORM_SAMPLES;
+        p->grain_log = p->samples ? form - LATHE_FORM_SAMPLES : form;
         lathe__draco_rings_free(&p->rings);
     }
 }
@@ -117,7 +120,7 @@ static void code_form(lathe_draco_walk *w, uint32_t part, bool told, uint32_t fo
 static uint32_t true_form(const lathe_draco_shape *shape) {
     uint32_t least = (uint32_t)(shape->stride[0] < shape->stride[1] ? shape->stride[0] : shape->stride[1]), log = 0;
     while (least >> log > 1 && log + 1 < LATHE_FORM_RINGS) log++;
-    return shape->rings.count ? LATHE_FORM_RINGS : log;
+    return shape->rings.count ? LATHE_FORM_RINGS : log + (shape->samples ? LATHE_FORM_SAMPLES : 0);
 }
 
 /* The slices that a structure shows from this level on: those before, unless they are dropped, and runs of new ones; its form. */
@@ -135,7 +138,7 @@ static void code_heights(lathe_draco_walk *w, uint32_t part) {
             if (!keep || !has_height(p->heights, p->height_count, truth->heights[i])) fresh[fresh_count++] = truth->heights[i];
         run_count = list_runs(runs, fresh, fresh_count);
     }
-    uint32_t form = truth ? true_form(truth) : 0, told = form != p->grain_log;
+    uint32_t form = truth ? true_form(truth) : 0, told = form != form_of(p);
     uint32_t head = lathe__walk_number(w, run_count * 4 + told * 2 + keep), kept = head & 1 ? p->height_count : 0, count = kept;
     code_form(w, part, head & 2, form);
     int32_t *heights = malloc(2 * LATHE_MAX_DIM * sizeof *heights), last = 0;

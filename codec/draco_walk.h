@@ -16,7 +16,7 @@ enum {
     LATHE_PAIR_SIDE = 64,      /* -32 .. 31 both ways */
 };
 #define LATHE_HALF_UNKNOWN INT32_MIN
-enum { LATHE_FORM_RINGS = 12 }; /* of a structure: below, log2 of its grain */
+enum { LATHE_FORM_RINGS = 12, LATHE_FORM_SAMPLES = 13 }; /* of a structure: below, log2 of its grain; from there on, too, of a raster's surface */
 
 typedef struct lathe_draco_walk {
     lathe_draco_mesh *mesh;

@@ -1,4 +1,5 @@
 #include "pyramid.h"
+#include "raster_surface.h"
 #include <string.h>
 
 /* ---- schedule ---- */
@@ -166,9 +167,8 @@ static lathe_status octahedron(lathe_mesh *out, const int32_t box[3]) {
     return LATHE_OK;
 }
 
-lathe_status lathe__pyramid_mesh(lathe_mesh *out, lathe_arena arena[2], const lathe_mask *raster, const int32_t stride[3],
-                                 const int32_t box[3], const lathe_surface_style *style, lathe_surface_counts *counts) {
-    if (is_empty(raster)) return octahedron(out, box);
+static lathe_status overlaid(lathe_mesh *out, lathe_arena arena[2], const lathe_mask *raster, const lathe_surface_style *style,
+                             lathe_surface_counts *counts) {
     lathe_arena list = {0};
     uint32_t count = (uint32_t)raster->size[2];
     int32_t *slices = LATHE_NEW(&list, int32_t, count);
@@ -176,6 +176,19 @@ lathe_status lathe__pyramid_mesh(lathe_mesh *out, lathe_arena arena[2], const la
     for (uint32_t i = 0; !status && i < count; i++) slices[i] = (int32_t)i;
     if (!status) status = lathe__build_styled(out, arena, raster, slices, count, style, counts);
     lathe__arena_free(&list);
+    return status;
+}
+
+lathe_status lathe__pyramid_mesh(lathe_mesh *out, lathe_arena arena[2], const lathe_mask *raster, const int32_t stride[3],
+                                 const int32_t box[3], bool cubes, const lathe_surface_style *style, int upright, lathe_surface_counts *counts) {
+    if (is_empty(raster)) return octahedron(out, box);
+    lathe_status status;
+    if (cubes || LATHE_RASTERS_ONLY) {
+        status = lathe__raster_surface(out, &arena[0], raster, (const int[]){style->fraction, upright});
+        counts->rays = (uint32_t)(raster->size[0] + raster->size[1] - 4);
+    } else {
+        status = overlaid(out, arena, raster, style, counts);
+    }
     for (uint32_t i = 0; !status && i < out->vertex_count; i++)
         for (int k = 0; k < 3; k++) out->lattice[i][k] *= stride[k];
     return status;

@@ -41,7 +41,7 @@ static lathe_status encode_alone(lathe_packet_list packets[LATHE_MAX_LEVELS], co
     lathe_arena arena[2] = {{0}};
     lathe_models models = {.widest = {3, 3}};
     lathe_baked_structure baked = {.level_count = level_count, .truth = decoded->radii};
-    lathe_structure_state alone = {.mask = decoded->mask, .plan = decoded->plan, .fraction = decoded->fraction, .level = -1,
+    lathe_structure_state alone = {.mask = decoded->mask, .plan = decoded->plan, .fraction = decoded->fraction, .upright = decoded->upright, .level = -1,
                                    .flags = decoded->flags & ~(uint32_t)LATHE_FLAG_SHARED, .exact_base = decoded->exact_base,
                                    .pyramid = decoded->pyramid};
     lathe_radii radii;

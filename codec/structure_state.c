@@ -184,9 +184,10 @@ static lathe_status raster_mesh(lathe_mesh *out, lathe_arena arena[2], const lat
                                 lathe_surface_counts *counts, uint32_t *shown) {
     const lathe_mask *raster = state->raster.bits ? &state->raster : &state->mask;
     bool whole = raster == &state->mask;
+    int upright = !whole ? LATHE_FRACTION_ONE / 2 : state->upright ? state->upright : state->fraction;
     lathe_surface_style style = {.fraction = whole ? state->fraction : LATHE_FRACTION_ONE / 2, .caps = whole ? caps : NULL};
     *shown = (uint32_t)raster->size[2];
-    return lathe__pyramid_mesh(out, arena, raster, state->stride, state->mask.size, &style, counts);
+    return lathe__pyramid_mesh(out, arena, raster, state->stride, state->mask.size, state->flags & LATHE_FLAG_CUBES, &style, upright, counts);
 }
 
 /* A level of whole slices, or of stars. */

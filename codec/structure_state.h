@@ -21,7 +21,7 @@ void lathe__models_start(lathe_models *models, const lathe_header *header);
 typedef struct lathe_structure_state {
     lathe_mask mask;           /* bits are allocated with the first level of slices */
     lathe_level_plan plan;     /* early: owned */
-    int fraction;              /* of border edges, header parameter 0 */
+    int fraction, upright;     /* of border edges, and of a raster's edges along w; header parameter 0 */
     uint32_t flags;            /* header parameter 1 */
     bool exact_base;           /* level 0 has slices, too, and no stars */
     int32_t level;             /* -1: nothing decoded yet */

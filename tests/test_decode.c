@@ -221,7 +221,8 @@ static void compare_with_state(const phantom *p, const lathe_model *model, const
     grey g;
     lathe_encode_source source = source_of(&g, volume, &state.mask, p->axis);
     if (lathe__header_parse(&header, &reader)) abort();
-    state.fraction = (int)header.parameters[0];
+    state.fraction = (int)header.parameters[0] & 63;
+    state.upright = (int)header.parameters[0] >> 6 & 63;
     state.flags = header.parameter_count > 1 ? header.parameters[1] & ~(uint32_t)LATHE_FLAG_SHARED : 0;
     lathe_pyramid pyramid;
     if (state.flags & LATHE_FLAG_PYRAMID) {

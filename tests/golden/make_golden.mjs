@@ -142,4 +142,11 @@ bake('ahead_tubes', raw('ahead_tubes', [60, 60, 60], (x, y, z) => Math.max(Math.
     z - 3, 56 - z), rod(x - 52, y - 30, z))), '--iso', '0');
 bake('early', raw('early', [56, 56, 56], (x, y, z) => dented(x - 27, y - 28, z - 27)), '--iso', '0');
 bake('early_tubes', raw('early_tubes', [70, 56, 56], (x, y, z) => Math.max(dented(x - 27, y - 28, z - 27), rod(x - 60, y - 30, z))), '--iso', '0');
+/* Surfaces cube by cube, with a fraction of their own along w; shared, independent, of one slice; a speck that strides miss. */
+bake('cubes', raw('cubes', [34, 31, 27], (x, y, z) => blob(x + 3, y + 3, z + 3)), '--iso', '0', '--exact');
+bake('cubes_shared', raw('cubes_shared', [56, 37, 29], label), '--labels', 'all');
+bake('cubes_independent', raw('cubes_independent', [56, 37, 29], label, [1, 1, 1.1]), '--labels', 'all', '--independent', '--axis', 'x');
+bake('cubes_thick', raw('cubes_thick', [60, 50, 7], (x, y, z) => ball(x - 30, y - 25, 6 * (z - 3), 22) + 3 * rough(x, y, 6 * z), [0.5, 0.7, 4]), '--iso', '0', '--exact');
+bake('cubes_specks', raw('cubes_specks', [40, 40, 40], (x, y, z) => (ball(x - 14, y - 15, z - 15, 12) > 0 ? 1 : x === 38 && y === 3 && z === 9 ? 2 : 0)), '--labels', 'all');
+bake('cubes_slice', raw('cubes_slice', [40, 32, 1], (x, y) => ball(x - 18, y - 16, 0, 13) + 3 * rough(x, y, 3)), '--iso', '0', '--exact');
 rmSync(scratch, { recursive: true });

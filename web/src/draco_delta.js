@@ -129,12 +129,12 @@ export function applyDelta(draco, model, bytes) {
     const flat = (a, b) => half[a] === half[b] && !(half[a] & 1);
     const open = (v, base, low, high) => (half[v] & 1 ? 0 : (half[v] === base ? low : high)[v] === NONE ? 1 : 2);
     const readHeights = (p) => {
-        const head = number(), heights = head & 1 ? [...p.heights] : [], form = head & 2 ? number() : Math.log2(p.grain);
+        const head = number(), heights = head & 1 ? [...p.heights] : [], form = head & 2 ? number() : Math.log2(p.grain) + (p.samples ? RINGS + 1 : 0);
         p.form = null;
         if (form === RINGS) {
             const forms = Array.from({ length: number() }, number);
             p.form = { tubes: forms.map((v) => ({ rays: 2 ** (v >> 1), clockwise: v & 1 })), turn: signed(), step: number() };
-        } else [p.grain, p.rings] = [2 ** form, null];
+        } else [p.grain, p.samples, p.rings] = [2 ** (form > RINGS ? form - RINGS - 1 : form), form > RINGS, null];
         for (let run = head >> 2, w = 0; run; run--) {
             w += signed();
             for (let step = number(), length = number(); length; length--, w += step) heights.push(w);
@@ -337,12 +337,26 @@ export function applyDelta(draco, model, bytes) {
         } while ((x = follow[x]) !== start);
     }
 
-    // ---- and those between: crossings of two outlines, or middles of diagonals
+    // ---- and those between: over samples, on lines of neighbours; or crossings of two outlines, or middles of diagonals
+    const overSamples = (x) => {
+        const lines = [new Map(), new Map()];
+        const put = (...point) => lines.forEach((line, k) => line.set(point[k], (line.get(point[k]) ?? 0) + 1));
+        const [u, v] = [(y) => at[3 * id[y]], (y) => at[3 * id[y] + 1]];
+        for (const i of corners[x].slice(0, MOST)) {
+            const y = triangles[after(i)], z = triangles[after(after(i))];
+            if (id[y] === NONE) continue;
+            put(u(y), v(y));
+            const far = triangles[after(after(across(after(i))))];
+            if (half[y] & half[z] & half[far] & 1 && id[z] !== NONE && id[far] !== NONE) put(u(y) + u(z) - u(far), v(y) + v(z) - v(far)); // the fourth corner of a parallelogram
+        }
+        return [...lines[0]].flatMap(([u, a]) => [...lines[1]].map(([v, b]) => ({ u, v, length: -a - b })))
+            .sort((a, b) => a.length - b.length).slice(0, MOST);
+    };
     for (let x = 0; x < count; x++) {
         if (!(half[x] & 1)) continue;
         const p = model.parts.get(part[x]), { heights, grain } = p, last = heights.length - 1, below = (half[x] - 1) / 2;
         const height = (i) => (i < 0 ? heights[0] - 2 : i > last ? heights[last] + 2 : heights[i]);
-        const middle = (height(below) + height(below + 1)) * (HEIGHT / 2), candidates = [];
+        const middle = (height(below) + height(below + 1)) * (HEIGHT / 2), candidates = p.samples ? overSamples(x) : [];
         const near = corners[x].map((i) => triangles[after(i)]).filter((y) => !(half[y] & 1)).slice(0, MOST);
         const [lower, upper] = [near.filter((y) => half[y] < half[x]), near.filter((y) => half[y] > half[x])];
         const xy = (y) => [at[3 * id[y]], at[3 * id[y] + 1]];
@@ -352,12 +366,12 @@ export function applyDelta(draco, model, bytes) {
             while (i && candidates[i - 1].length > length) i--;
             candidates.splice(i, 0, { u, v, length });
         };
-        for (const a of lower) for (const b of lower) if (follow[a] === b) for (const c of upper) for (const d of upper) if (follow[c] === d) {
+        if (!p.samples) for (const a of lower) for (const b of lower) if (follow[a] === b) for (const c of upper) for (const d of upper) if (follow[c] === d) {
             const [p, q, r, s] = [a, b, c, d].map(xy), [du, dv] = [q[0] - p[0], q[1] - p[1]], [eu, ev] = [s[0] - r[0], s[1] - r[1]];
             const turn = du * ev - dv * eu, t = turn ? Math.min(Math.max(((r[0] - p[0]) * ev - (r[1] - p[1]) * eu) / turn, 0.0625), 0.9375) : 0.5;
             put(Math.floor(p[0] + du * t + 0.5), Math.floor(p[1] + dv * t + 0.5), -1);
         }
-        near.forEach((a, i) => near.slice(i + 1).forEach((b) => {
+        if (!p.samples) near.forEach((a, i) => near.slice(i + 1).forEach((b) => {
             if (half[a] !== half[b] || follow[a] === b || follow[b] === a) return;
             const [p, q] = [xy(a), xy(b)];
             put((p[0] + q[0]) >> 1, (p[1] + q[1]) >> 1, (p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2);
