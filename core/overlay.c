@@ -577,7 +577,8 @@ static bool merge_strip(overlay *o, int side, const strip *s, bool open) {
         if (can_p && can_q) can_p = distance2(next_a, b) <= distance2(a, next_b);
         if (can_p) {
             emit(o, side, *p, p[1], *q);
-            p++, target += !!target;
+            p++;
+            if (target) target++;
             a = next_a;
         } else if (can_q) {
             emit(o, side, *p, q[1], *q);

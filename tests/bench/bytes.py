@@ -90,7 +90,7 @@ def wasm_ratio(archive, lathe, wasm, seconds):
     block = max(1, min(60, round(0.05 / seconds)))   # decodings between two looks at the clock
     for _ in range(2):
         native.append(json.loads(bench.output([lathe, "bench", "decode", archive, "--json", "--repeat", str(5 * block)]))["seconds"])
-        done = subprocess.run(["node", os.path.join(bench.HERE, "bytes_wasm.mjs"), archive, wasm, str(block)], capture_output=True, text=True)
+        done = subprocess.run(["node", "--single-threaded", os.path.join(bench.HERE, "bytes_wasm.mjs"), archive, wasm, str(block)], capture_output=True, text=True)
         if done.returncode: return None
         browser.append(json.loads(done.stdout)["seconds"])
     return min(browser) / min(native)

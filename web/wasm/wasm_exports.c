@@ -65,6 +65,9 @@ lathe_status EXPORT(mesh)(uint32_t structure) {
     return lathe__shade(shading, positions, mesh->vertex_count, indices, mesh->triangle_count);
 }
 
+/* Builds a structure's mesh and nothing else: what is measured. */
+lathe_status EXPORT(build)(uint32_t structure) { return decoder && lathe_decoder_mesh(decoder, structure) ? LATHE_OK : LATHE_ERR_FORMAT; }
+
 const char *EXPORT(error_text)(void) { return decoder ? lathe_decoder_error(decoder) : ""; }
 uint32_t EXPORT(structures)(void) { return decoder ? lathe_decoder_structures(decoder) : 0; }
 

@@ -53,6 +53,7 @@ static int grow_heap(size_t size) {
             block *first = (block *)start;
             first->size = heap_end - start;
             insert_free(first);
+            if (first->size >= size) return 1;
         }
     }
     size_t pages = size / PAGE + 1;
