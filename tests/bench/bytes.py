@@ -87,10 +87,10 @@ def wasm_ratio(archive, lathe, wasm, seconds):
     """CPU time of the viewer's decoder over that of the native one, which takes about so many seconds: the better of two turns each,
     one after the other. None if that decoder cannot decode the archive"""
     native, browser = [], []
-    block = max(1, min(60, round(0.05 / seconds)))   # decodings between two looks at the clock
+    runs = str(max(5, min(1000, round(0.25 / seconds))))
     for _ in range(2):
-        native.append(json.loads(bench.output([lathe, "bench", "decode", archive, "--json", "--repeat", str(5 * block)]))["seconds"])
-        done = subprocess.run(["node", "--single-threaded", os.path.join(bench.HERE, "bytes_wasm.mjs"), archive, wasm, str(block)], capture_output=True, text=True)
+        native.append(json.loads(bench.output([lathe, "bench", "decode", archive, "--json", "--repeat", runs]))["seconds"])
+        done = subprocess.run(["node", "--single-threaded", os.path.join(bench.HERE, "bytes_wasm.mjs"), archive, wasm, runs], capture_output=True, text=True)
         if done.returncode: return None
         browser.append(json.loads(done.stdout)["seconds"])
     return min(browser) / min(native)

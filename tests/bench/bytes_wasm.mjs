@@ -1,11 +1,10 @@
-// bytes_wasm.mjs ARCHIVE DECODER.wasm [BLOCK [BLOCKS]]: CPU seconds of the viewer's decoder for one decoding of an archive to the last
-// meshes, as `lathe bench decode` measures it natively. The sum of BLOCK decodings one after the other, so that small archives take long
-// enough to be measured; the fastest of BLOCKS counts. The native decoder has the pages, and what the caches hold of them, of the
-// decoding before. So does this one: an instance is made new by writing back what its memory began with, while the clock stands still.
+// bytes_wasm.mjs ARCHIVE DECODER.wasm [RUNS]: CPU seconds of the viewer's decoder for one decoding of an archive to the last meshes, the
+// fastest of RUNS, as `lathe bench decode` measures it natively. The native decoder has the pages, and what the caches hold of them, of
+// the decoding before. So does this one: an instance is made new by writing back what its memory began with, while the clock stands still.
 // Run with --single-threaded: the engine's own threads are not to count.
 import { readFileSync } from 'node:fs';
 
-const [archivePath, wasmPath, block = '1', blocks = '5'] = process.argv.slice(2);
+const [archivePath, wasmPath, runs = '5'] = process.argv.slice(2);
 const archive = readFileSync(archivePath);
 const stream = archive.subarray(0, Number(archive.readBigUInt64LE(archive.length - 16)));   // the footer's offset: docs/FORMAT.md
 const module = new WebAssembly.Module(readFileSync(wasmPath));
@@ -39,15 +38,11 @@ function decode() {
 }
 
 function time() {
-    let spent = 0;
-    for (let i = 0; i < Number(block); i++) {
-        view().set(first);
-        const start = seconds();
-        decode();
-        spent += seconds() - start;
-    }
-    return spent / Number(block);
+    view().set(first);
+    const start = seconds();
+    decode();
+    return seconds() - start;
 }
 
 for (const end = seconds() + 0.5; seconds() < end; ) time();   // the engine compiles again what is hot
-console.log(JSON.stringify({ seconds: Math.min(...Array.from({ length: Number(blocks) }, time)) }));
+console.log(JSON.stringify({ seconds: Math.min(...Array.from({ length: Number(runs) }, time)) }));
