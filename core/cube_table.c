@@ -53,7 +53,9 @@ static void add_triangle(lathe_cube_case *c, int p, int q, int r) {
     t[0] = (uint8_t)p, t[1] = (uint8_t)q, t[2] = (uint8_t)r;
 }
 
-static bool may_join(const uint8_t *loop, int n, int i, int k) { return k == i + 1 || (i == 0 && k == n - 1) || !share_face(loop[i], loop[k]); }
+static bool may_join(const uint8_t *loop, int n, int i, int k) {
+    return k == i + 1 || (i == 0 && k == n - 1) || !share_face(loop[i], loop[k]);
+}
 
 /* Triangles between the vertices i .. k of a loop; false if there are none without an edge in a face. */
 static bool fill(lathe_cube_case *c, const uint8_t *loop, int n, int i, int k) {

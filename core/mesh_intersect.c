@@ -118,8 +118,26 @@ static bool segment_meets(point s, point t, int os, int ot, const point q[3]) {
     return x * z >= 0 && y * z >= 0;
 }
 
+/* On which side of q's plane do some points lie, as lathe__orient3d(q, point) says? Its normal serves for all; filtered as above. */
+static void find_sides(int *side, const point *p, int count, const point q[3]) {
+    double u[3], v[3], normal[3], size[3];
+    for (int i = 0; i < 3; i++) u[i] = (double)q[1][i] - q[0][i], v[i] = (double)q[2][i] - q[0][i];
+    for (int i = 0; i < 3; i++) {
+        int j = i == 2 ? 0 : i + 1, k = 3 - i - j;
+        double f = u[j] * v[k], g = u[k] * v[j];
+        normal[i] = f - g;
+        size[i] = fabs(f) + fabs(g);
+    }
+    for (int n = 0; n < count; n++) {
+        double x = (double)p[n][0] - q[0][0], y = (double)p[n][1] - q[0][1], z = (double)p[n][2] - q[0][2];
+        double det = (normal[0] * x + normal[1] * y) + normal[2] * z;
+        bool sure = fabs(det) > 0x1p-50 * (size[0] * fabs(x) + size[1] * fabs(y) + size[2] * fabs(z));
+        side[n] = !sure ? lathe__orient3d(q[0], q[1], q[2], p[n]) : det < 0 ? 1 : -1;
+    }
+}
+
 static bool sides(int side[3], const point p[3], const point q[3]) {
-    for (int k = 0; k < 3; k++) side[k] = lathe__orient3d(q[0], q[1], q[2], p[k]);
+    find_sides(side, p, 3, q);
     return !((side[0] > 0 && side[1] > 0 && side[2] > 0) || (side[0] < 0 && side[1] < 0 && side[2] < 0));
 }
 
@@ -137,11 +155,12 @@ static bool apart_meet(const point p[3], const point q[3]) {
 /* Corner 0 of both is shared. What they share beyond it reaches along a ray from it to the opposite edge of one of
  * them. */
 static bool at_corner_meet(const point p[3], const point q[3]) {
-    int p1 = lathe__orient3d(q[0], q[1], q[2], p[1]), p2 = lathe__orient3d(q[0], q[1], q[2], p[2]);
-    if (p1 * p2 > 0) return false;
-    int q1 = lathe__orient3d(p[0], p[1], p[2], q[1]), q2 = lathe__orient3d(p[0], p[1], p[2], q[2]);
-    if (q1 * q2 > 0) return false;
-    return segment_meets(p[1], p[2], p1, p2, q) || segment_meets(q[1], q[2], q1, q2, p);
+    int ps[2], qs[2];
+    find_sides(ps, p + 1, 2, q);
+    if (ps[0] * ps[1] > 0) return false;
+    find_sides(qs, q + 1, 2, p);
+    if (qs[0] * qs[1] > 0) return false;
+    return segment_meets(p[1], p[2], ps[0], ps[1], q) || segment_meets(q[1], q[2], qs[0], qs[1], p);
 }
 
 /* Edge a, b is shared: they overlap when c and d lie in one plane, on one side. */

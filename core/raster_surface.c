@@ -23,7 +23,9 @@ static size_t place_of(const surface *s, int edge, int odd) {
     return 4 * s->area + (size_t)first + (size_t)second * width;
 }
 
-static lathe_status add_vertices(surface *s, uint64_t crossed, uint64_t inside, int axis, uint32_t *ids, int32_t u, int32_t v, int32_t w) {
+/* Of the 64 samples from (u, v, w) on; ids: of row v. */
+static lathe_status add_vertices(surface *s, uint64_t crossed, uint64_t inside, int axis, uint32_t *ids, int32_t u, int32_t v,
+                                 int32_t w) {
     if (!crossed) return LATHE_OK;
     lathe_status status = lathe__builder_reserve(&s->builder, 64, 0);
     if (status) return status;
@@ -42,6 +44,11 @@ static const uint64_t *row_at(const lathe_mask *mask, const uint64_t *air, int32
     return w < 0 || w >= mask->size[2] ? air : lathe__mask_slice(mask, w) + (size_t)v * (size_t)mask->row_words;
 }
 
+/* Word i of a row, moved so that each sample is where the one before it was. */
+static uint64_t shifted(const uint64_t *row, int32_t i, int32_t words) {
+    return row[i] >> 1 | (i + 1 < words ? row[i + 1] << 63 : 0);
+}
+
 /* Vertices on edges within a slice. */
 static lathe_status slice_vertices(surface *s, int32_t w) {
     const lathe_mask *mask = s->mask;
@@ -50,9 +57,10 @@ static lathe_status slice_vertices(surface *s, int32_t w) {
     for (int32_t v = 0; v + 1 < mask->size[1]; v++) {
         const uint64_t *row = lathe__mask_slice(mask, w) + (size_t)v * (size_t)words;
         for (int32_t i = 0; i < words; i++) {
-            uint64_t next = row[i] >> 1 | (i + 1 < words ? row[i + 1] << 63 : 0);
-            lathe_status status = add_vertices(s, row[i] ^ next, row[i], 0, along_u + (size_t)v * (size_t)mask->size[0], i * 64, v, w);
-            if (!status) status = add_vertices(s, row[i] ^ row[i + words], row[i], 1, along_v + (size_t)v * (size_t)mask->size[0], i * 64, v, w);
+            uint64_t next = shifted(row, i, words);
+            size_t at = (size_t)v * (size_t)mask->size[0];
+            lathe_status status = add_vertices(s, row[i] ^ next, row[i], 0, along_u + at, i * 64, v, w);
+            if (!status) status = add_vertices(s, row[i] ^ row[i + words], row[i], 1, along_v + at, i * 64, v, w);
             if (status) return status;
         }
     }
@@ -65,14 +73,13 @@ static lathe_status upright_vertices(surface *s, const uint64_t *air, int32_t w)
     for (int32_t v = 0; v < mask->size[1]; v++) {
         const uint64_t *low = row_at(mask, air, v, w), *high = row_at(mask, air, v, w + 1);
         for (int32_t i = 0; i < mask->row_words; i++) {
-            lathe_status status = add_vertices(s, low[i] ^ high[i], low[i], 2, s->ids + 4 * s->area + (size_t)v * (size_t)mask->size[0], i * 64, v, w);
+            uint32_t *ids = s->ids + 4 * s->area + (size_t)v * (size_t)mask->size[0];
+            lathe_status status = add_vertices(s, low[i] ^ high[i], low[i], 2, ids, i * 64, v, w);
             if (status) return status;
         }
     }
     return LATHE_OK;
 }
-
-static uint64_t shifted(const uint64_t *row, int32_t i, int32_t words) { return row[i] >> 1 | (i + 1 < words ? row[i + 1] << 63 : 0); }
 
 static lathe_status layer_cubes(surface *s, const uint64_t *air, int32_t w) {
     const lathe_mask *mask = s->mask;
@@ -80,7 +87,8 @@ static lathe_status layer_cubes(surface *s, const uint64_t *air, int32_t w) {
     size_t place[LATHE_CUBE_EDGES];
     for (int e = 0; e < LATHE_CUBE_EDGES; e++) place[e] = place_of(s, e, w & 1);
     for (int32_t v = 0; v + 1 < mask->size[1]; v++) {
-        const uint64_t *row[4] = {row_at(mask, air, v, w), row_at(mask, air, v + 1, w), row_at(mask, air, v, w + 1), row_at(mask, air, v + 1, w + 1)};
+        const uint64_t *row[4] = {row_at(mask, air, v, w), row_at(mask, air, v + 1, w),
+                                  row_at(mask, air, v, w + 1), row_at(mask, air, v + 1, w + 1)};
         for (int32_t i = 0; i < words; i++) {
             uint64_t here[4], next[4], any = 0, all = ~(uint64_t)0;
             for (int k = 0; k < 4; k++) {
@@ -109,7 +117,9 @@ static lathe_status layer_cubes(surface *s, const uint64_t *air, int32_t w) {
     return LATHE_OK;
 }
 
-static int limited(int fraction) { return fraction < LATHE_FRACTION_MIN ? LATHE_FRACTION_MIN : fraction > LATHE_FRACTION_MAX ? LATHE_FRACTION_MAX : fraction; }
+static int limited(int fraction) {
+    return fraction < LATHE_FRACTION_MIN ? LATHE_FRACTION_MIN : fraction > LATHE_FRACTION_MAX ? LATHE_FRACTION_MAX : fraction;
+}
 
 lathe_status lathe__raster_surface(lathe_mesh *out, lathe_arena *scratch, const lathe_mask *mask, const int fraction[2]) {
     surface s = {.mask = mask, .area = (size_t)mask->size[0] * (size_t)mask->size[1],
