@@ -35,10 +35,10 @@ static void fill_slots(slot *at, size_t count, slot value) {
 }
 
 static void make_ignorant(lathe_occupancy *s) {
-    fill_slots(s->slots, lathe__small_slots(s->sure) + ((size_t)1 << s->slot_bits), (slot)1 << 31);
+    fill_slots(s->slots, lathe__small_slots(lathe__is_sure(s)) + ((size_t)1 << s->slot_bits), (slot)1 << 31);
     fill_slots(s->m.run[0][0], sizeof s->m.run / sizeof(slot), (slot)1 << 28);
     for (int i = 0; i < BY_SIDE; i++)
-        for (int k = 0; k < INPUTS; k++) s->m.weight[i][k] = WEIGHT_ONE / 2 / (s->sure ? INPUTS_SURE : INPUTS);
+        for (int k = 0; k < INPUTS; k++) s->m.weight[i][k] = WEIGHT_ONE / 2 / (lathe__is_sure(s) ? INPUTS_SURE : INPUTS);
 }
 
 /* The blob that trains a new state: noise, smoothed three times along each axis, and cut at its mean. */
@@ -88,7 +88,7 @@ static lathe_status train(lathe_occupancy *s) {
     make_blob(blob->bits, blob->values);
     s->count_max = COUNT_TRAINING;   /* so that real data soon outweighs the blob */
     code_blob(s, blob->bits);
-    s->count_max = s->sure ? COUNT_MAX_SURE : COUNT_MAX;
+    s->count_max = lathe__is_sure(s) ? COUNT_MAX_SURE : COUNT_MAX;
     free(blob);
     return LATHE_OK;
 }
@@ -138,7 +138,7 @@ void lathe__occupancy_free(lathe_occupancy **state) {
 /* A slot's place is the top bits of a hash, so a larger table starts with each slot repeated, and a smaller one with every
  * so-manieth: whatever the template's size was, the same state comes out. */
 static void copy_slots(lathe_occupancy *s, const lathe_occupancy *from) {
-    size_t small = lathe__small_slots(s->sure);
+    size_t small = lathe__small_slots(lathe__is_sure(s));
     int32_t more = s->slot_bits - from->slot_bits, up = more > 0 ? more : 0, down = more < 0 ? -more : 0;
     memcpy(s->slots, from->slots, small * sizeof(slot));
     for (size_t i = 0; i < (size_t)1 << s->slot_bits; i++) s->slots[small + i] = from->slots[small + (i >> up << down)];
@@ -146,7 +146,7 @@ static void copy_slots(lathe_occupancy *s, const lathe_occupancy *from) {
 
 lathe_status lathe__occupancy_copy(lathe_occupancy **out, const lathe_occupancy *from, int32_t width, int32_t height) {
     lathe_occupancy *s;
-    lathe_status status = allocate(&s, width, height, slot_bits_of(width, height, from->sure), from->sure);
+    lathe_status status = allocate(&s, width, height, slot_bits_of(width, height, lathe__is_sure(from)), lathe__is_sure(from));
     if (status != LATHE_OK) return status;
     s->count_max = from->count_max;
     s->m = from->m;

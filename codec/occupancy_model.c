@@ -82,7 +82,7 @@ static inline uint32_t square(const uint64_t *w, int line) {
 }
 
 static inline slot *slot_of(lathe_occupancy *s, uint64_t key, uint64_t salt) {
-    return s->slots + lathe__small_slots(s->sure) + ((key + (salt << 40)) * 0x9E3779B97F4A7C15u >> (64 - s->slot_bits));
+    return s->slots + lathe__small_slots(lathe__is_sure(s)) + ((key + (salt << 40)) * 0x9E3779B97F4A7C15u >> (64 - s->slot_bits));
 }
 
 /* key: the small context. */
@@ -100,7 +100,7 @@ static inline void contexts(lathe_occupancy *s, slot *found[INPUTS], int32_t x, 
     /* Both sides share their statistics: the same salt. */
     found[3] = slot_of(s, causal10 | below << 10, 5);
     found[4] = slot_of(s, causal10 | above << 10, 5);
-    if (s->sure) return;
+    if (lathe__is_sure(s)) return;
     uint32_t causal25 = left | field(w[CUR1], -4, 9) << 4 | field(w[CUR2], -3, 7) << 13 | field(w[CUR3], -2, 5) << 20;
     found[0] = slot_of(s, key << 1 | mode << 14, 1);
     found[5] = slot_of(s, causal25 | centres << 25, 3);
@@ -114,7 +114,7 @@ static int code_doubtful(lathe_occupancy *s, const lathe_bit_coder *coder, slot 
                          uint64_t flip, int bit) {
     slot *found[INPUTS] = {small};
     contexts(s, found, x, mode, key, flip);
-    int inputs = s->sure ? INPUTS_SURE : INPUTS;
+    int inputs = lathe__is_sure(s) ? INPUTS_SURE : INPUTS;
     int32_t logit[INPUTS], *by_seen[INPUTS], *by_near = s->m.weight[BY_NEAR + (key & 7)];
     int32_t *by_side = s->m.weight[BY_SIDE + mode * 4 + (key >> 4 & 1) + (key >> 8 & 2)];
     int64_t sum = 0;
@@ -127,7 +127,7 @@ static int code_doubtful(lathe_occupancy *s, const lathe_bit_coder *coder, slot 
     sum >>= 16;
     uint32_t p = s->m.chance[(sum < -LOGIT_MAX ? -LOGIT_MAX : sum > LOGIT_MAX ? LOGIT_MAX : sum) + LOGIT_MAX];
     bit = code_bit(coder, p, bit);
-    int32_t speed = s->sure ? LEARN_SURE : s->pixels < FAST_PIXELS ? LEARN_FAST : LEARN_SLOW;
+    int32_t speed = lathe__is_sure(s) ? LEARN_SURE : s->pixels < FAST_PIXELS ? LEARN_FAST : LEARN_SLOW;
     s->pixels += s->pixels < FAST_PIXELS;
     int32_t step = ((bit << 16) - (int32_t)p) * speed / 16;
     for (int i = 0; i < inputs; i++) {
@@ -149,7 +149,7 @@ static inline int code_mixed(lathe_occupancy *s, const lathe_bit_coder *coder, k
     uint32_t key = key_of(group, x) ^ (flip & ((1 << KEY_BITS) - 1));
     slot *small = NULL;
     bit ^= before;
-    if (s->sure) {
+    if (lathe__is_sure(s)) {
         small = &s->slots[mode << KEY_BITS | key];
         uint32_t p = chance_of(*small);
         if (p - SURE >= 65536 - 2 * SURE && (*small & COUNT_MASK) >= SURE_COUNT) {
@@ -271,7 +271,7 @@ static void code_row(lathe_occupancy *s, const lathe_bit_coder *coder, const uin
 }
 
 static uint32_t mode_of(const lathe_known *known, bool sure) {
-    if (!sure && known->estimate) return known->estimate == 1 ? 6 : 7;
+    if (!LATHE_RASTERS_ONLY && !sure && known->estimate) return known->estimate == 1 ? 6 : 7;
     if (!known->below && !known->above) return 0;
     if (!known->below || !known->above) return 1;
     int32_t gap = known->gap_below < known->gap_above ? known->gap_below : known->gap_above;
@@ -281,7 +281,7 @@ static uint32_t mode_of(const lathe_known *known, bool sure) {
 
 void lathe__occupancy_walk(lathe_occupancy *s, const lathe_bit_coder *coder, uint64_t *out, const lathe_known *known) {
     size_t row_words = (size_t)s->row_words, row_bytes = row_words * sizeof *out;
-    uint32_t mode = mode_of(known, s->sure);
+    uint32_t mode = mode_of(known, lathe__is_sure(s));
     memset(s->memory, 0, LINES * (row_bytes + 2 * sizeof *out));
     if (out) memset(out, 0, row_bytes * (size_t)s->height);
     for (int32_t y = -1; y < s->height - 1; y++) {

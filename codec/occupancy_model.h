@@ -53,7 +53,8 @@ struct lathe_occupancy {
 };
 
 /* How many slots come before the hashed ones. */
-static inline size_t lathe__small_slots(bool sure) { return sure ? SURE_SLOTS : 0; }
+static inline bool lathe__is_sure(const lathe_occupancy *s) { return LATHE_RASTERS_ONLY || s->sure; }
+static inline size_t lathe__small_slots(bool sure) { return LATHE_RASTERS_ONLY || sure ? SURE_SLOTS : 0; }
 static inline uint32_t lathe__floor_log2(uint32_t x) { return 31 - (uint32_t)__builtin_clz(x | 1); }
 
 /* One walk over the pixels serves decoding, encoding and training. */

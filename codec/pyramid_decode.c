@@ -53,5 +53,5 @@ lathe_status lathe__pass_decode(lathe_structure_state *state, lathe_range_decode
     lathe__state_drop_occupancy(state);
     state->mask.bits = state->raster.bits;   /* of one size: the last strides are 1 */
     state->raster.bits = NULL;
-    return state->flags & LATHE_FLAG_CAPS && !(state->flags & LATHE_FLAG_SHARED) ? lathe__keep_caps(state, d) : LATHE_OK;
+    return !LATHE_RASTERS_ONLY && state->flags & LATHE_FLAG_CAPS && !(state->flags & LATHE_FLAG_SHARED) ? lathe__keep_caps(state, d) : LATHE_OK;
 }

@@ -48,7 +48,7 @@ void lathe__models_start(lathe_models *models, const lathe_header *header) {
 
 lathe_status lathe__state_start_occupancy(lathe_structure_state *state, lathe_models *models) {
     lathe_status status = LATHE_OK;
-    bool sure = state->pyramid && state->flags & LATHE_FLAG_SURE;
+    bool sure = LATHE_RASTERS_ONLY || (state->pyramid && state->flags & LATHE_FLAG_SURE);
     if (!models->occupancy) status = lathe__occupancy_new(&models->occupancy, models->widest[0], models->widest[1], sure);
     if (status) return status;
     if (!(state->flags & LATHE_FLAG_SHARED))
@@ -210,11 +210,15 @@ lathe_status lathe__state_mesh(lathe_mesh *out, lathe_arena arena[2], const lath
     *counts = (lathe_surface_counts){0};
     if (!lathe__state_known(state)) return LATHE_ERR_RANGE;
     if (state->radii && !LATHE_RASTERS_ONLY) return lathe__radii_mesh(out, arena, state->radii, (uint32_t)state->level, counts, shown);
-    cap_reader reader = {.caps = {read_shape, NULL}, .code = state->cap_code};
-    lathe__number_start(reader.models, LATHE_CAP_MODELS, LATHE_NUMBER_START);
-    lathe_caps *caps = state->cap_bytes ? &reader.caps : state->caps;
-    lathe_status status = LATHE_RASTERS_ONLY || state->pyramid ? raster_mesh(out, arena, state, caps, counts, shown)
-                                                               : slices_mesh(out, arena, state, caps, counts, shown);
+    lathe_status status;
+    if (LATHE_RASTERS_ONLY) {
+        status = raster_mesh(out, arena, state, NULL, counts, shown);
+    } else {
+        cap_reader reader = {.caps = {read_shape, NULL}, .code = state->cap_code};
+        lathe__number_start(reader.models, LATHE_CAP_MODELS, LATHE_NUMBER_START);
+        lathe_caps *caps = state->cap_bytes ? &reader.caps : state->caps;
+        status = state->pyramid ? raster_mesh(out, arena, state, caps, counts, shown) : slices_mesh(out, arena, state, caps, counts, shown);
+    }
     lathe__arena_reset(&arena[0]);
     lathe__arena_reset(&arena[1]);
     return status;

@@ -22,13 +22,6 @@ typedef struct lathe_outline {
     int32_t *ray;              /* per point: index of the ray that meets the loop there, or -1 (between rays) */
 } lathe_outline;
 
-/* A decoder of rasters alone: all of its outlines are lattice ones, none is thinned. What it never does is left out where this says so. */
-#ifdef LATHE_RASTERS
-enum { LATHE_RASTERS_ONLY = 1 };
-#else
-enum { LATHE_RASTERS_ONLY = 0 };
-#endif
-
 /* Helpers that are used in many places: fast where code may be large, shared where it must be small (wasm). */
 #ifdef LATHE_SMALL
 #define LATHE_HELPER __attribute__((weak, noinline))

@@ -94,4 +94,10 @@ void lathe_mesh_indices(const lathe_mesh *mesh, const lathe_transform *transform
 #ifdef __cplusplus
 }
 #endif
+/* A decoder of rasters alone, of the newest kind (FORMAT.md: PYRAMID, SURE, CUBES). What it never does is left out where this says so. */
+#ifdef LATHE_RASTERS
+enum { LATHE_RASTERS_ONLY = 1 };
+#else
+enum { LATHE_RASTERS_ONLY = 0 };
+#endif
 #endif
