@@ -246,7 +246,7 @@ def measure(name, scan, lathe, wasm, folder, quick):
     result["draco"] = len(output([lathe, "export", archive, "--format", "drc", "-o", "-"]))
     # One after the other and twice, so that a busy moment of the machine does not decide.
     speed = [(json.loads(output([lathe, "bench", "decode", archive, "--json"])),
-              json.loads(output(["node", os.path.join(HERE, "decode_wasm.mjs"), archive, wasm]))) for _ in range(2)]
+              json.loads(output(["node", "--single-threaded", os.path.join(HERE, "decode_wasm.mjs"), archive, wasm]))) for _ in range(2)]
     result["native"] = min((n for n, _ in speed), key=lambda n: n["seconds"])
     result["native"]["all_levels_seconds"] = min(n["all_levels_seconds"] for n, _ in speed)
     result["wasm"] = {**speed[0][1], **{k: min(w[k] for _, w in speed) for k in ("seconds", "all_levels_seconds")}}

@@ -90,7 +90,7 @@ def wasm_ratio(archive, lathe, wasm, seconds):
     runs = str(max(5, min(1000, round(0.25 / seconds))))
     for _ in range(2):
         native.append(json.loads(bench.output([lathe, "bench", "decode", archive, "--json", "--repeat", runs]))["seconds"])
-        done = subprocess.run(["node", "--single-threaded", os.path.join(bench.HERE, "bytes_wasm.mjs"), archive, wasm, runs], capture_output=True, text=True)
+        done = subprocess.run(["node", "--single-threaded", os.path.join(bench.HERE, "decode_wasm.mjs"), archive, wasm, runs], capture_output=True, text=True)
         if done.returncode: return None
         browser.append(json.loads(done.stdout)["seconds"])
     return min(browser) / min(native)
