@@ -6,6 +6,7 @@
 #include "archive_write.h"
 #include "base_shape.h"
 #include "check.h"
+#include "raster_surface.h"
 #include "structure_state.h"
 
 #if defined(__SANITIZE_ADDRESS__)
@@ -292,6 +293,28 @@ static void padded_planes(void) {
     lathe__bytes_free(&payload);
 }
 
+/* The surface of a checkerboard: a vertex on every edge between samples, triangles in every cube. */
+static void cubes(void) {
+    lathe_mask mask;
+    if (lathe__mask_new(&mask, (int32_t[]){194, 194, 48}, (int32_t[]){-1, -1, 0})) abort();
+    for (int32_t w = 0; w < 48; w++)
+        for (int32_t v = 1; v < 193; v++)
+            for (int32_t u = 1; u < 193; u++)
+                if ((u + v + w) & 1)
+                    lathe__mask_slice(&mask, w)[(size_t)v * (size_t)mask.row_words + (size_t)(u >> 6)] |= (uint64_t)1 << (u & 63);
+    lathe_arena scratch = {0};
+    lathe_mesh mesh;
+    size_t before = most = held;
+    CHECK_EQ(lathe__raster_surface(&mesh, &scratch, &mask, (const int[]){32, 32}), LATHE_OK);
+    CHECK(mesh.vertex_count > 5000000);
+    /* Growing, an array is there twice, the new one half as large again. */
+    size_t bound = (size_t)20 * 194 * 194 + ((size_t)mesh.vertex_count + mesh.triangle_count) * 12 * 5 / 2 + (64 << 10);
+    check_bound("cubes", most - before, bound, 0.4);
+    lathe_mesh_free(&mesh);
+    lathe__arena_free(&scratch);
+    lathe__mask_free(&mask);
+}
+
 /* ---- whole files ---- */
 
 static int append(void *context, const void *bytes, size_t size) {
@@ -344,6 +367,7 @@ int main(void) {
     largest_radius_map();
     empty_slices();
     padded_planes();
+    cubes();
     largest_archive();
     return check_end();
 }
