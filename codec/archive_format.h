@@ -83,7 +83,8 @@ enum { LATHE_NUMBER_ZERO, LATHE_NUMBER_WHOLE, LATHE_NUMBER_FLOAT, LATHE_NUMBER_D
  * CUBES: of a pyramid: its surface is made cube by cube (raster_surface.h). */
 enum {
     LATHE_FLAG_CAPS = 1, LATHE_FLAG_KEEP = 2, LATHE_FLAG_SHARED = 4, LATHE_FLAG_EXACT = 8, LATHE_FLAG_PYRAMID = 16, LATHE_FLAG_SURE = 32,
-    LATHE_FLAG_CUBES = 64
+    LATHE_FLAG_CUBES = 64,
+    LATHE_RASTER_FLAGS = LATHE_FLAG_PYRAMID | LATHE_FLAG_SURE | LATHE_FLAG_CUBES   /* what the decoder of rasters needs */
 };
 
 typedef struct lathe_header {

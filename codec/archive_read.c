@@ -307,6 +307,7 @@ static void fill_info(lathe_model *model) {
     model->info.exact = flags & LATHE_FLAG_EXACT;
     model->info.independent = !(flags & LATHE_FLAG_SHARED);
     model->info.pyramid = flags & LATHE_FLAG_PYRAMID;
+    model->info.rasters_only = !(~flags & LATHE_RASTER_FLAGS);
     model->info.levels = model->totals;
     sum_components(model);
     fill_polar_bytes(model);

@@ -125,7 +125,7 @@ static lathe_status next_packet(lathe_decoder *d, const uint8_t **payload, uint3
     if (!d->has_header) {
         lathe_status status = lathe__header_parse(&d->header, &reader);
         if (status) return reading(d, &reader, status);
-        bool strange = LATHE_RASTERS_ONLY && ~lathe__header_flags(&d->header) & (LATHE_FLAG_PYRAMID | LATHE_FLAG_SURE | LATHE_FLAG_CUBES);
+        bool strange = LATHE_RASTERS_ONLY && ~lathe__header_flags(&d->header) & LATHE_RASTER_FLAGS;
         status = strange ? LATHE_ERR_FORMAT : start_structures(d);
         if (status) return fail(d, status, strange ? "the model is not made of rasters: the whole decoder reads it" : LATHE_FAULT("header"));
         d->has_header = true;

@@ -76,6 +76,7 @@ typedef struct lathe_model_info {
     bool caps;                     /* caps of the last level have coded shapes */
     bool exact;                    /* no structure is a radius map */
     bool independent, pyramid;     /* each structure can be decoded alone; levels are rasters, not slices */
+    bool rasters_only;             /* rasters of the newest kind: the decoder of rasters reads them */
     /* Of the whole model at each level: area-weighted RMS, largest max (negative: not measured), and totals. */
     const lathe_level_info *levels;
 } lathe_model_info;

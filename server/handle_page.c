@@ -30,7 +30,7 @@ static lathe_status write_model(lathe_buffer *out, const page *p) {
         status = LATHE_ERR_MEMORY;
     if (!status) status = write_base(out, p);
     if (!status && lathe__buffer_text(out, "</script><script id=\"wasm\" type=\"text/plain\">")) status = LATHE_ERR_MEMORY;
-    bool rasters = lathe_model_describe(p->entry->model)->pyramid;
+    bool rasters = lathe_model_describe(p->entry->model)->rasters_only;
     if (!status && lathe__buffer_append(out, rasters ? lathe_rasters_text : lathe_decoder_text,
                                         rasters ? lathe_rasters_text_size : lathe_decoder_text_size))
         status = LATHE_ERR_MEMORY;

@@ -2,7 +2,7 @@
 // LATHE_HASH_STREAM=FILE with LATHE_HASH_EXPECT=FILE (lines as `lathe hash --each` prints them) checks another stream.
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
-import { readFile } from 'node:fs/promises';
+import { readdir, readFile } from 'node:fs/promises';
 import { join } from 'node:path';
 import { before, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
@@ -143,4 +143,27 @@ test('the decoder of rasters refuses other models with words', { skip: !modules.
         assert.equal(feed(whole, await readFile(`../tests/golden/${golden}.lathe`)), 0);
         assert.equal(whole.step(), 0);
     }
+});
+
+test('the decoder that a page carries reads the model of that page', { skip: !modules.rasters }, async () => {
+    const goldens = (await readdir('../tests/golden')).filter((name) => name.endsWith('.lathe'));
+    const server = await serve('../tests/golden');
+    const key = +/WASM_KEY = (\d+)/.exec(await readFile('src/bytes.ts', 'utf8'))[1], sizes = new Set();
+    try {
+        for (const golden of goldens) {
+            const name = golden.slice(0, -'.lathe'.length);
+            const html = await (await fetch(`${server.url}/m/${name}`)).text();
+            const text = /<script id="wasm" type="text\/plain">(.*?)<\/script>/s.exec(html)[1];
+            const module = await WebAssembly.compile(Uint8Array.from(text, (c) => c.charCodeAt(0) ^ key));
+            sizes.add(text.length);
+            const wasm = await open(module), stream = await (await fetch(`${server.url}/models/${name}/stream`)).arrayBuffer();
+            let steps = 0;
+            assert.equal(feed(wasm, new Uint8Array(stream)), 0, name);
+            assert.equal(stepAll(wasm, () => steps++), 1, `${name}: the page's decoder reads all of it`);
+            assert.ok(steps > 0, name);
+        }
+    } finally {
+        await server.stop();
+    }
+    assert.equal(sizes.size, 2, 'both decoders are carried by some page');
 });
