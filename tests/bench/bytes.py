@@ -87,7 +87,7 @@ def wasm_ratio(archive, lathe, wasm, seconds):
     """CPU time of the viewer's decoder over that of the native one, which takes about so many seconds: the better of two turns each,
     one after the other. None if that decoder cannot decode the archive"""
     native, browser = [], []
-    runs = str(max(5, min(1000, round(0.25 / seconds))))
+    runs = str(max(15, min(1000, round(0.25 / seconds))))
     for _ in range(2):
         native.append(json.loads(bench.output([lathe, "bench", "decode", archive, "--json", "--repeat", runs]))["seconds"])
         done = subprocess.run(["node", "--single-threaded", os.path.join(bench.HERE, "decode_wasm.mjs"), archive, wasm, runs], capture_output=True, text=True)
@@ -108,7 +108,7 @@ def measure(volume, arguments, effort, folder, known):
     started = time.time()
     small = volume.kind != "folded"
     reference = distance.Reference(volume.reference(), volume.voxel)
-    stream = Stream(volume, arguments.lathe, folder, 300 if small else 3)
+    stream = Stream(volume, arguments.lathe, folder, 1000 if small else 3)
     curve = Curve(stream, reference, effort.samples)
     curve.measure(effort.processes)
     reached = {target: curve.reach(target) for target in TARGETS}
