@@ -32,7 +32,7 @@ FUZZERS := $(basename $(notdir $(wildcard tests/fuzz_*.c)))
 WASM_SOURCES := $(addprefix core/,status.c arena.c ray.c crossing.c contour.c grammar.c tiling.c centre.c grid.c outline.c triangulate.c \
                   overlay.c tube.c builder.c cube_table.c raster_surface.c level.c refinement.c mask.c mesh.c) \
                 $(addprefix codec/,range_decoder.c occupancy_model.c model_state.c occupancy_decode.c base_shape.c base_decode.c radius_map.c radius_mesh.c \
-                  radius_tubes.c radius_stack.c structure_state.c structure_decode.c pyramid.c pyramid_decode.c archive_parse.c crc32c.c decode.c) \
+                  radius_tubes.c radius_stack.c radius_joint.c structure_state.c structure_decode.c pyramid.c pyramid_decode.c archive_parse.c crc32c.c decode.c) \
                 $(wildcard web/wasm/*.c)
 
 # ---- flags -------------------------------------------------------------------------------------------------------------
@@ -62,10 +62,11 @@ LIBS := -Wl,--as-needed -lmicrohttpd -ljansson -ldraco -lnifti2 -lznz -lz -lbrot
 
 WASM := build/wasm/lathe.wasm
 RASTERS := build/wasm/rasters.wasm
+TUBES := build/wasm/tubes.wasm
 VIEWER := web/dist/viewer.html
 DRACO_PAGE := web/dist/draco.html
 # What is linked into the program: lathe_NAME and the file in web/dist.
-EMBEDDED := viewer_html:viewer.html extras_js:extras.js decoder_text:decoder.txt rasters_text:rasters.txt draco_html:draco.html
+EMBEDDED := viewer_html:viewer.html extras_js:extras.js decoder_text:decoder.txt rasters_text:rasters.txt tubes_text:tubes.txt draco_html:draco.html
 
 # ---- the program -------------------------------------------------------------------------------------------------------
 
@@ -123,12 +124,13 @@ WASM_LINK := --no-entry --gc-sections --strip-all --stack-first -z stack-size=26
 WASM_BUILTINS = $(firstword $(shell find -L $$($(CLANG) -print-resource-dir)/lib -name 'libclang_rt.builtins*wasm32*.a' 2>/dev/null))
 
 .PHONY: wasm web
-wasm: $(WASM) $(RASTERS) ## the decoder as wasm: build/wasm/lathe.wasm; of rasters alone: build/wasm/rasters.wasm
+wasm: $(WASM) $(RASTERS) $(TUBES) ## the decoder as wasm: build/wasm/lathe.wasm; of rasters or tubes alone: rasters.wasm, tubes.wasm beside it
 web: $(VIEWER) $(DRACO_PAGE) ## the viewer page: web/dist/viewer.html; the page of the Draco deltas
 
 HOT := $(addsuffix %,$(addprefix codec/,occupancy_ range_ pyramid radius_m radius_tubes radius_stack base_decode structure_decode) $(addprefix core/,raster_surface triangulate grid overlay outline centre crossing))
 # Where the time goes: 1.6 kB more, a fifth faster.
 $(foreach dir,build/wasm build/wasm/rasters,$(patsubst %.c,$(dir)/%.o,$(filter $(HOT),$(WASM_SOURCES)))): WASM_OPTIMISE := -O2 -fno-unroll-loops
+$(patsubst %,build/wasm/tubes/%.o,$(addprefix codec/,range_decoder radius_map radius_mesh)): WASM_OPTIMISE := -O2 -fno-unroll-loops
 # Not in the decoder of rasters, which is loaded first: unrolled, a tenth faster still.
 $(patsubst %.c,build/wasm/%.o,$(filter codec/radius_% core/triangulate%,$(WASM_SOURCES))): WASM_OPTIMISE := -O3
 
@@ -136,25 +138,30 @@ build/wasm/%.o: %.c
 	@mkdir -p $(@D)
 	@echo "  wasm  $<"
 	$(Q)$(CLANG) $(WASM_FLAGS) -c -o $@ $<
-# The same sources: what a decoder of rasters never does is dropped by the linker.
+# The same sources: what a decoder of rasters or of tubes never does is dropped by the linker.
 build/wasm/rasters/%.o: %.c
 	@mkdir -p $(@D)
 	@echo "  wasm  $< (rasters)"
 	$(Q)$(CLANG) $(WASM_FLAGS) -DLATHE_RASTERS -c -o $@ $<
+build/wasm/tubes/%.o: %.c
+	@mkdir -p $(@D)
+	@echo "  wasm  $< (tubes)"
+	$(Q)$(CLANG) $(WASM_FLAGS) -DLATHE_TUBES -c -o $@ $<
 $(WASM): $(WASM_SOURCES:%.c=build/wasm/%.o)
 $(RASTERS): $(WASM_SOURCES:%.c=build/wasm/rasters/%.o)
-$(WASM) $(RASTERS):
+$(TUBES): $(WASM_SOURCES:%.c=build/wasm/tubes/%.o)
+$(WASM) $(RASTERS) $(TUBES):
 	@echo "  link  $@"
 	$(Q)$(WASM_LD) $(WASM_LINK) -o $@ $^ $(WASM_BUILTINS)
 
 web/node_modules/.package-lock.json: web/package-lock.json
 	@echo "  npm   web"
 	$(Q)cd web && npm ci --no-audit --no-fund --loglevel=error && touch node_modules/.package-lock.json
-$(VIEWER): $(WASM) $(RASTERS) web/node_modules/.package-lock.json web/build.mjs $(wildcard web/src/* web/*.json)
+$(VIEWER): $(WASM) $(RASTERS) $(TUBES) web/node_modules/.package-lock.json web/build.mjs $(wildcard web/src/* web/*.json)
 	@echo "  web   $@"
-	$(Q)cd web && node build.mjs ../$(WASM) ../$(RASTERS) ../$(VIEWER)
+	$(Q)cd web && node build.mjs ../$(WASM) ../$(RASTERS) ../$(TUBES) ../$(VIEWER)
 # Written with the page.
-$(addprefix web/dist/,extras.js decoder.txt rasters.txt): $(VIEWER)
+$(addprefix web/dist/,extras.js decoder.txt rasters.txt tubes.txt): $(VIEWER)
 $(DRACO_PAGE): web/node_modules/.package-lock.json web/build_draco.mjs $(wildcard web/src/draco*)
 	@echo "  web   $@"
 	$(Q)cd web && node build_draco.mjs ../$(DRACO_PAGE)

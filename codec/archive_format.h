@@ -36,6 +36,8 @@ enum {
 #else
 #define LATHE_FAULT(text) text
 #endif
+/* What a small decoder says that does not read a model. */
+#define LATHE_OTHERS "the model is made of something else: the whole decoder reads it"
 
 /* ---- cursor: checked little-endian reads ---- */
 
@@ -103,6 +105,10 @@ typedef struct lathe_header {
  * complete and its checksum right. */
 lathe_status lathe__header_parse(lathe_header *out, lathe_reader *reader);
 uint32_t lathe__header_flags(const lathe_header *header);   /* parameter 1 */
+/* A decoder of tubes refuses such headers and asks no more. */
+static inline bool lathe__header_pyramid(const lathe_header *header) {
+    return !LATHE_TUBES_ONLY && lathe__header_flags(header) & LATHE_FLAG_PYRAMID;
+}
 void lathe__header_free(lathe_header *header); /* clears; a zeroed one is fine */
 /* How many structures have the level, and how many packets its record has: one for each; of a pyramid one for each pass and
  * structure, pass by pass, or with SHARED one for each pass. */

@@ -134,7 +134,7 @@ lathe_status lathe__header_check(const lathe_header *header, const char **fault)
     for (uint32_t i = 0; i < header->structure_count && !status; i++)
         status = structure_check(&header->structures[i], fault);
     lathe_pyramid pyramid;
-    if (status || !(lathe__header_flags(header) & LATHE_FLAG_PYRAMID)) return status;
+    if (status || !lathe__header_pyramid(header)) return status;
     *fault = LATHE_FAULT("the passes of a level");
     return lathe__pyramid_read(&pyramid, header);
 }
@@ -267,10 +267,10 @@ uint32_t lathe__header_present(const lathe_header *header, uint32_t level) {
 uint32_t lathe__header_flags(const lathe_header *header) { return header->parameter_count > 1 ? header->parameters[1] : 0; }
 
 uint32_t lathe__header_packets(const lathe_header *header, uint32_t level) {
-    uint32_t flags = lathe__header_flags(header), present = lathe__header_present(header, level);
+    uint32_t present = lathe__header_present(header, level);
     lathe_pyramid pyramid;
-    if (!(flags & LATHE_FLAG_PYRAMID) || lathe__pyramid_read(&pyramid, header)) return present;
-    return (flags & LATHE_FLAG_SHARED ? 1 : present) * lathe__pyramid_passes(&pyramid, level);
+    if (!lathe__header_pyramid(header) || lathe__pyramid_read(&pyramid, header)) return present;
+    return (lathe__header_flags(header) & LATHE_FLAG_SHARED ? 1 : present) * lathe__pyramid_passes(&pyramid, level);
 }
 
 /* ---- level record ---- */

@@ -92,7 +92,7 @@ static lathe_status start_structures(lathe_decoder *d) {
     d->transforms = calloc(n, sizeof *d->transforms);
     if (!d->states || !d->transforms) return LATHE_ERR_MEMORY;
     lathe__models_start(&d->models, &d->header);
-    bool pyramid = lathe__header_flags(&d->header) & LATHE_FLAG_PYRAMID;
+    bool pyramid = lathe__header_pyramid(&d->header);
     if (pyramid && lathe__pyramid_read(&d->pyramid, &d->header)) return LATHE_ERR_FORMAT;
     for (uint32_t i = 0; i < n; i++) {
         const lathe_header_structure *h = &d->header.structures[i];
@@ -125,9 +125,10 @@ static lathe_status next_packet(lathe_decoder *d, const uint8_t **payload, uint3
     if (!d->has_header) {
         lathe_status status = lathe__header_parse(&d->header, &reader);
         if (status) return reading(d, &reader, status);
-        bool strange = LATHE_RASTERS_ONLY && ~lathe__header_flags(&d->header) & LATHE_RASTER_FLAGS;
+        uint32_t flags = lathe__header_flags(&d->header);
+        bool strange = (LATHE_RASTERS_ONLY && ~flags & LATHE_RASTER_FLAGS) || (LATHE_TUBES_ONLY && flags & LATHE_FLAG_PYRAMID);
         status = strange ? LATHE_ERR_FORMAT : start_structures(d);
-        if (status) return fail(d, status, strange ? "the model is not made of rasters: the whole decoder reads it" : LATHE_FAULT("header"));
+        if (status) return fail(d, status, strange ? LATHE_OTHERS : LATHE_FAULT("header"));
         d->has_header = true;
         d->used = (size_t)(reader.at - d->bytes);
     }
@@ -169,7 +170,7 @@ static lathe_status shared_step(lathe_decoder *d, const uint8_t *payload, uint32
 
 static lathe_status single_step(lathe_decoder *d, const uint8_t *payload, uint32_t size, const char **fault) {
     lathe_structure_state *state = &d->states[d->next_structure];
-    if (!state->pyramid && !LATHE_RASTERS_ONLY) return lathe__structure_decode(state, &d->arena[0], &d->models, d->head.level, payload, size, fault);
+    if (!lathe__is_pyramid(state)) return lathe__structure_decode(state, &d->arena[0], &d->models, d->head.level, payload, size, fault);
     lathe__decoder_start(&d->code, payload, size);
     return lathe__pass_decode(state, &d->code, &d->models, d->head.level, fault);
 }
@@ -184,15 +185,15 @@ static lathe_status next_step(lathe_decoder *d, lathe_step *step) {
     uint32_t s = d->next_structure;
     lathe_structure_state *state = &d->states[s];
     const char *fault = LATHE_FAULT("");
-    bool shared = state->pyramid && state->flags & LATHE_FLAG_SHARED;
+    bool shared = lathe__is_pyramid(state) && state->flags & LATHE_FLAG_SHARED;
     d->has_mesh = false;
     status = shared ? shared_step(d, payload, size, &fault) : single_step(d, payload, size, &fault);
     lathe__arena_reset(&d->arena[0]);
     if (status) return fail(d, status, fault);
-    uint32_t left = state->level == (int32_t)d->head.level ? 0 : lathe__pyramid_passes(&d->pyramid, d->head.level) - state->pass;
+    uint32_t left = !lathe__is_pyramid(state) || state->level == (int32_t)d->head.level ? 0 : lathe__pyramid_passes(&d->pyramid, d->head.level) - state->pass;
     *step = (lathe_step){.structure = s, .level = d->head.level, .error_rms_mm = d->head.error_rms_mm,
                          .error_max_mm = d->head.error_max_mm, .passes_left = left};
-    if (++d->next_structure == d->header.structure_count && state->pyramid) d->next_structure = 0;
+    if (++d->next_structure == d->header.structure_count && lathe__is_pyramid(state)) d->next_structure = 0;
     if (!shared || !d->next_structure) end_packet(d);
     return LATHE_OK;
 }

@@ -89,6 +89,9 @@ lathe_status lathe_model_parse(lathe_model **out, const uint8_t *bytes, size_t s
 void lathe_model_close(lathe_model **model);
 const lathe_model_info *lathe_model_describe(const lathe_model *model);
 const uint8_t *lathe_model_bytes(const lathe_model *model, size_t *size);           /* the whole archive */
+/* The smallest of the browser's decoders that reads the model. Decodes the base shapes unless the model is made of rasters. */
+typedef enum lathe_small_decoder { LATHE_DECODER_WHOLE, LATHE_DECODER_RASTERS, LATHE_DECODER_TUBES } lathe_small_decoder;
+lathe_small_decoder lathe_model_decoder(const lathe_model *model);
 /* Index of a structure by name, or -1. */
 int64_t lathe_model_find(const lathe_model *model, const char *name);
 

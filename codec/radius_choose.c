@@ -84,6 +84,7 @@ typedef struct trial {
     size_t borders, samples;   /* border edges of the mask; points of a measurement */
     double apart[LATHE_MAX_LEVELS];   /* what estimates leave out, squared: measured minus estimated */
     double spacing[3];         /* of u, v, w, mm */
+    int64_t components, euler; /* of the mask's surface */
 } trial;
 
 typedef struct outcome {
@@ -452,42 +453,74 @@ static bool sound(const lathe_mesh *mesh, int64_t components, int64_t euler, boo
            !r.duplicate_positions && !r.self_intersections && (int64_t)r.components == components && r.euler == euler;
 }
 
-/* The overlay makes a sound surface of whatever outlines fit together, strips of rows that do not turn cannot cross themselves: what has
- * few triangles is checked for its topology, else outlines are. All is checked of level 0, which turns the sharpest corners, and of strips
- * that turn. */
-static lathe_status check_level(bool *good, trial *t, lathe_radii *coded, uint32_t level, int64_t components, int64_t euler) {
-    enum { FEW = 3000 };
-    lathe_surface_counts counts = {0};
-    lathe_mesh mesh = {0};
+static lathe_status outlines_fit(bool *good, trial *t, lathe_radii *coded, uint32_t level) {
     int32_t *slices;
     uint32_t shown, stride;
     lathe_status status = lathe__radii_slices(&slices, &shown, &stride, &t->arena[1], coded, level);
-    for (uint32_t i = 0; !status && *good && coded->count > 1 && i < shown; i++) {
+    for (uint32_t i = 0; !status && *good && i < shown; i++) {
         lathe_outline outline;
         status = lathe__radii_outline(&outline, &t->arena[1], coded, level, slices[i], stride, i);
         *good = !status && lathe__loops_fit(&outline);
     }
     lathe__arena_reset(&t->arena[1]);
-    if (status || !*good || (level && (coded->count == 1 && !coded->tubes[0].map.turn))) return status;
-    if (level && (uint64_t)shown * coded->tubes[0].map.rays / stride * 2 > FEW) return LATHE_OK;
-    status = lathe__radii_mesh(&mesh, &t->arena[1], coded, level, &counts, &shown);
-    if (!status) *good = sound(&mesh, components, euler, coded->tubes[0].map.turn || (coded->count > 1 && !level));
+    return status;
+}
+
+/* Slabs of plain tubes meet in outlines, which fit: within each of them, either tubes keep apart or it is looked at. */
+static lathe_status joints_fit(bool *good, trial *t, lathe_radii *coded, uint32_t level) {
+    lathe_mesh mesh = {0};
+    lathe_mesh_report r;
+    lathe_status status = lathe__radii_joints(&mesh, &t->arena[1], coded, level);
+    if (!status) status = lathe__mesh_check(&r, &mesh, true);
+    if (!status) *good = !r.self_intersections;
     lathe_mesh_free(&mesh);
     return status;
 }
 
+/* The overlay makes a sound surface of whatever outlines fit together, strips of rows that do not turn cannot cross themselves: what has
+ * few triangles is checked for its topology, else outlines are. All is checked of level 0, which turns the sharpest corners, and of strips
+ * that turn; of plain tubes, which close whatever they are, all that is not known to be sound. */
+static lathe_status check_level(bool *good, trial *t, lathe_radii *coded, uint32_t level) {
+    enum { FEW = 3000 };
+    lathe_surface_counts counts = {0};
+    lathe_mesh mesh = {0};
+    bool turned = coded->tubes[0].map.turn, tubes = coded->count > 1;
+    uint32_t shown;
+    lathe_status status = tubes ? outlines_fit(good, t, coded, level) : LATHE_OK;
+    if (status || !*good || (level && !tubes && !turned)) return status;
+    status = lathe__radii_mesh(&mesh, &t->arena[1], coded, level, &counts, &shown);
+    bool few = !level || mesh.triangle_count <= FEW;
+    if (!status && coded->plain) *good = (int64_t)mesh.vertex_count - mesh.triangle_count / 2 == t->euler;
+    if (!status && *good && few) *good = sound(&mesh, t->components, t->euler, turned || (tubes && !level));
+    lathe_mesh_free(&mesh);
+    if (!status && *good && level && coded->plain) status = joints_fit(good, t, coded, level);
+    return status;
+}
+
 /* Codes all levels; their bytes. */
-static lathe_status check_levels(size_t *bytes, trial *t, const lathe_structure_state *state) {
+static lathe_status check_levels(size_t *bytes, bool *good, trial *t) {
     lathe_radii coded = frame_of(t);
-    lathe_topology all = {.components = 1, .euler = 1};
-    bool good = true;
-    lathe_status status = t->truth.count > 1 ? lathe__mask_topology(&all, &state->mask, NULL) : LATHE_OK;
+    lathe_status status = LATHE_OK;
     lathe__arena_reset(&t->arena[0]);
     *bytes = 0;
-    for (uint32_t level = 0; !status && good && level < coded.level_count; level++) {
+    *good = true;
+    for (uint32_t level = 0; !status && *good && level < coded.level_count; level++) {
         status = add_bytes(bytes, &coded, t, level);
-        if (!status) status = check_level(&good, t, &coded, level, all.components + all.cavities, 2 * all.euler);
+        if (!status) status = check_level(good, t, &coded, level);
     }
+    return status;
+}
+
+/* Do the tubes go together at the first level and at the last one? Cheaper to know than to find out in the end. */
+static lathe_status try_joints(trial *t) {
+    outcome o;
+    bool good = true;
+    uint32_t last = t->truth.level_count - 1;
+    if (!t->truth.plain) return LATHE_OK;
+    set_steps(&t->truth, USUAL_STEP, 0, 0);
+    lathe_status status = try_steps(&o, t, last + 1, last);
+    if (!status) status = check_level(&good, t, &o.coded, last);
+    if (!status && good) status = check_level(&good, t, &o.coded, 0);
     return status ? status : good ? LATHE_OK : LATHE_ERR_EMPTY;
 }
 
@@ -496,6 +529,7 @@ static lathe_status check_levels(size_t *bytes, trial *t, const lathe_structure_
 static lathe_status fit_tubes(lathe_radii *truth, lathe_arena *arena, lathe_arena *scratch, const lathe_traced_tubes *traced) {
     lathe_status status = LATHE_OK;
     truth->count = traced->count;
+    truth->plain = truth->count > 1;
     truth->tubes = LATHE_NEW(arena, lathe_radius_tube, traced->count);
     if (!truth->tubes) return LATHE_ERR_MEMORY;
     memset(truth->tubes, 0, traced->count * sizeof *truth->tubes);
@@ -568,15 +602,20 @@ static lathe_status earns_its_place(bool *good, size_t bytes, const trial *t, co
 }
 
 static lathe_status choose(trial *t, const lathe_structure_state *state) {
-    uint32_t level;
+    uint32_t level = 0;
     size_t bytes = 0;
     bool good = true;
-    lathe_status status = choose_ahead(t);
+    lathe_topology all = {.components = 1, .euler = 1};
+    lathe_status status = t->truth.count > 1 ? lathe__mask_topology(&all, &state->mask, NULL) : LATHE_OK;
+    t->components = all.components + all.cavities;
+    t->euler = 2 * all.euler;
+    if (!status) status = choose_ahead(t);
+    if (!status) status = try_joints(t);
     if (!status) status = choose_step(&level, t);
     if (!status) status = choose_early(t, level);
     if (!status) status = choose_fine_step(t, level);
-    if (!status) status = check_levels(&bytes, t, state);
-    if (!status) status = earns_its_place(&good, bytes, t, state);
+    if (!status) status = check_levels(&bytes, &good, t);
+    if (!status && good) status = earns_its_place(&good, bytes, t, state);
     return status ? status : good ? LATHE_OK : LATHE_ERR_EMPTY;
 }
 

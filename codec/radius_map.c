@@ -47,11 +47,7 @@ int32_t lathe__centre_between(int32_t low, int32_t at_low, int32_t high, int32_t
 }
 
 enum { NEAR = 81 };            /* as large as that is as large as it gets */
-#ifdef LATHE_SMALL
-enum { ENCODES = 0 };
-#else
-enum { ENCODES = 1 };
-#endif
+enum { ENCODES = LATHE_RADII_ENCODE };
 
 typedef struct walk {
     lathe_radius_map *map;

@@ -14,6 +14,13 @@ enum {
     LATHE_RADIUS_MOST_AHEAD = 12
 };
 
+/* A small decoder only reads. */
+#ifdef LATHE_SMALL
+enum { LATHE_RADII_ENCODE = 0 };
+#else
+enum { LATHE_RADII_ENCODE = 1 };
+#endif
+
 typedef struct lathe_radius_models {
     lathe_number_model radius[LATHE_RADIUS_KINDS][LATHE_RADIUS_CLASSES], centres, starts;
 } lathe_radius_models;

@@ -107,10 +107,11 @@ static void measure_ring(ring *r, const stack *s, uint32_t tube, int32_t row) {
     const int32_t *radius = map->radius + (size_t)row * map->rays;
     int32_t least = radius[0], most = least, jump = 0, before = radius[map->rays - s->stride[tube]];
     for (uint32_t i = 0; i < map->rays; before = radius[i], i += s->stride[tube]) {
+        most = radius[i] > most ? radius[i] : most;
+        if (LATHE_TUBES_ONLY) continue;
         int32_t rise = radius[i] < before ? before - radius[i] : radius[i] - before;
         jump = rise > jump ? rise : jump;
         least = radius[i] < least ? radius[i] : least;
-        most = radius[i] > most ? radius[i] : most;
     }
     /* Directions are as long as LATHE_RAY_LENGTH but for less than a thousandth. */
     r->least = (double)least * (LATHE_LATTICE_ONE / LATHE_RADIUS_ONE - 1);
@@ -210,6 +211,11 @@ static bool are_apart(const stack *s, uint32_t slab, uint32_t t, uint32_t u) {
     return x * x + y * y > both * both || is_within(s, slab, t, u) || is_within(s, slab, u, t);
 }
 
+static void merge_groups(uint8_t *group, uint32_t count, uint8_t both) {
+    for (uint32_t k = 0; k < count; k++)
+        if (group[k] & both) group[k] = both;
+}
+
 static void group_slab(stack *s, uint32_t slab) {
     uint8_t *group = s->group[slab], all = 0, holes = 0;
     uint32_t n = s->radii->count;
@@ -224,8 +230,7 @@ static void group_slab(stack *s, uint32_t slab) {
             uint8_t both = group[t] | group[u];
             /* The overlay takes holes for solids if there is nothing else. */
             if (both & holes && both & ~holes) both = all;
-            for (uint32_t k = 0; k < n; k++)
-                if (group[k] & both) group[k] = both;
+            merge_groups(group, n, both);
         }
     for (uint32_t t = 0; t < n; t++)
         if (group[t] == 1 << t && can_be_strip(s, slab, t)) group[t] = 0;
@@ -286,6 +291,119 @@ static lathe_status add_group(stack *s, uint32_t slab, uint32_t group) {
     return status;
 }
 
+/* ---- plain tubes ---- */
+
+static bool has_ring(const stack *s, uint32_t slab, int side, uint32_t tube) { return s->rings[(int32_t)slab - 1 + side][tube].base != NONE; }
+
+static bool is_over(const ring *a, const ring *b) {
+    double x = (double)a->centre[0] - b->centre[0], y = (double)a->centre[1] - b->centre[1], most = a->most > b->most ? a->most : b->most;
+    return x * x + y * y < most * most;
+}
+
+/* Do tubes that end or begin in a slab belong together? Those that go over into each other do, and holes that end with what is around
+ * them. */
+static bool belong(const stack *s, uint32_t slab, uint32_t t, uint32_t u, bool over) {
+    const lathe_radius_tube *tubes = s->radii->tubes;
+    int side = has_ring(s, slab, 1, t), other = has_ring(s, slab, 1, u);
+    if ((tubes[t].hole == tubes[u].hole) != over || (side != other) != over) return false;
+    return is_over(&s->rings[(int32_t)slab - 1 + side][t], &s->rings[(int32_t)slab - 1 + other][u]);
+}
+
+/* The tubes that a slab joins with each tube that ends or begins there, itself included; 0: it goes on. */
+static void find_joints(uint8_t *group, const stack *s, uint32_t slab) {
+    uint32_t n = s->radii->count;
+    uint8_t over = 0;
+    for (uint32_t t = 0; t < n; t++) group[t] = has_ring(s, slab, 0, t) != has_ring(s, slab, 1, t) ? (uint8_t)(1 << t) : 0;
+    bool gap = slab && slab < s->count && s->slices[slab] - s->slices[slab - 1] > 1;   /* what ends there does not touch what begins */
+    for (int pass = gap; pass < 2; pass++)
+        for (uint32_t t = 0; t < n; t++)
+            for (uint32_t u = 0; u < t; u++) {
+                if (!group[t] || !group[u] || (pass && (over >> t & 1 || over >> u & 1)) || !belong(s, slab, t, u, !pass)) continue;
+                merge_groups(group, n, group[t] | group[u]);
+                if (!pass) over |= group[t];
+            }
+}
+
+static uint32_t add_vertex(lathe_mesh *mesh, int32_t x, int32_t y, int32_t z) {
+    int32_t *v = mesh->lattice[mesh->vertex_count];
+    v[0] = x, v[1] = y, v[2] = z;
+    return mesh->vertex_count++;
+}
+
+/* What nothing follows on ends with its ring once more, as high as the caps rise and an eighth narrower, holes in it wider. */
+static uint32_t add_rim(lathe_mesh *mesh, const ring *r, uint32_t rays, int side, int32_t rise, bool wider) {
+    uint32_t rim = mesh->vertex_count;
+    for (uint32_t i = 0; i < rays; i++) {
+        const int32_t *v = mesh->lattice[r->base + i];
+        int32_t at[2];
+        for (int k = 0; k < 2; k++) at[k] = v[k] + (int32_t)(((int64_t)v[k] - r->centre[k]) / (wider ? 8 : -8));
+        add_vertex(mesh, at[0], at[1], v[2] + rise);
+    }
+    lathe__radius_strip(mesh->triangles + mesh->triangle_count, (const int32_t(*)[3])mesh->lattice, side ? rim : r->base, side ? r->base : rim, rays);
+    mesh->triangle_count += 2 * rays;
+    return rim;
+}
+
+/* All of a group's rings lie in one slice: a solid and holes in it, or one alone. What is left between rims is filled. */
+static void add_end(stack *s, uint32_t slab, uint32_t group, int side, lathe_ring_chain chain[2]) {
+    lathe_mesh *mesh = &s->builder.mesh;
+    const ring *ring = NULL;
+    int32_t rise = s->map[0].apex[!side] * (LATHE_LATTICE_ONE / LATHE_APEX_ONE) * (side ? -1 : 1);
+    bool alone = !(group & (group - 1));
+    for (uint32_t t = 0; t < s->radii->count; t++) {
+        if (!(group >> t & 1)) continue;
+        bool inner = !alone && s->radii->tubes[t].hole;
+        ring = &s->rings[(int32_t)slab - 1 + side][t];
+        uint32_t rim = add_rim(mesh, ring, s->rays[t], side, rise, inner);
+        lathe__chain_ring(&chain[side != inner], (const int32_t(*)[3])mesh->lattice, rim, s->rays[t]);
+    }
+    lathe_ring_chain *in = &chain[!side];
+    if (alone) in->vertices[in->count++] = add_vertex(mesh, ring->centre[0], ring->centre[1], mesh->lattice[mesh->vertex_count - 1][2]);
+    for (uint32_t i = 0; i < in->count / 2; i++) {   /* holes go round the other way */
+        uint32_t v = in->vertices[i];
+        in->vertices[i] = in->vertices[in->count - 1 - i], in->vertices[in->count - 1 - i] = v;
+    }
+}
+
+static lathe_status add_joint(stack *s, uint32_t slab, uint32_t group) {
+    enum { BRIDGES = 2 * LATHE_TUBES_MOST };
+    lathe_ring_chain chain[2] = {{0}};
+    bool any[2] = {false};
+    for (int side = 0; side < 2; side++) {
+        chain[side].vertices = LATHE_NEW(s->scratch, uint32_t, s->most + BRIDGES);
+        if (!chain[side].vertices) return LATHE_ERR_MEMORY;
+        for (uint32_t t = 0; t < s->radii->count; t++) any[side] |= group >> t & 1 && has_ring(s, slab, side, t);
+    }
+    if (any[0] != any[1]) add_end(s, slab, group, any[1], chain);
+    for (int side = 0; side < 2 && any[0] == any[1]; side++)
+        for (uint32_t t = 0; t < s->radii->count; t++)
+            if (group >> t & 1 && has_ring(s, slab, side, t))
+                lathe__chain_ring(&chain[side], (const int32_t(*)[3])s->builder.mesh.lattice, s->rings[(int32_t)slab - 1 + side][t].base, s->rays[t]);
+    lathe_status status = lathe__join_chains(&s->builder.mesh, s->scratch, &chain[0], &chain[1]);
+    lathe__arena_reset(s->scratch);
+    return status;
+}
+
+static lathe_status add_plain_slab(stack *s, uint32_t slab) {
+    enum { BRIDGES = 4 * LATHE_TUBES_MOST };
+    uint8_t group[LATHE_TUBES_MOST];
+    lathe_mesh *mesh = &s->builder.mesh;
+    lathe_status status = lathe__builder_reserve(&s->builder, 2 * s->most + LATHE_TUBES_MOST, 6 * s->most + BRIDGES);
+    find_joints(group, s, slab);
+    for (uint32_t t = 0; !status && t < s->radii->count; t++) {
+        const ring *lower = &s->rings[(int32_t)slab - 1][t], *upper = &s->rings[slab][t];
+        if (group[t]) {
+            if (!(group[t] & ((1 << t) - 1))) status = add_joint(s, slab, group[t]);
+        } else if (lower->base != NONE) {
+            lathe__radius_strip(mesh->triangles + mesh->triangle_count, (const int32_t(*)[3])mesh->lattice, lower->base, upper->base, s->rays[t]);
+            mesh->triangle_count += 2 * s->rays[t];
+        }
+    }
+    return status;
+}
+
+/* ---- tubes that the overlay joins ---- */
+
 static lathe_status add_slab(stack *s, uint32_t slab) {
     const uint8_t *group = s->group[slab];
     lathe_mesh *mesh = &s->builder.mesh;
@@ -303,15 +421,40 @@ static lathe_status add_slab(stack *s, uint32_t slab) {
     return status;
 }
 
+static bool needs_proof(const stack *s, uint32_t slab) {
+    uint8_t any = 0;
+    for (uint32_t t = 0; t < s->radii->count; t++) any |= s->group[slab][t];
+    return any;
+}
+
 static lathe_status stack_tubes(lathe_mesh *out, lathe_arena arena[2], lathe_radii *radii, uint32_t level, const int32_t *slices, uint32_t count,
-                                uint32_t stride, lathe_surface_counts *counts) {
+                                uint32_t stride, bool joints, lathe_surface_counts *counts) {
     stack s = {.keep = &arena[0], .scratch = &arena[1], .radii = radii, .slices = slices, .count = count, .counts = counts};
     lathe_status status = open_stack(&s, stride, radii, level);
-    if (!status) memset(s.group[count + 1], 0, sizeof *s.group);
-    for (uint32_t i = 0; !status && i <= count; i++) group_slab(&s, i);
-    for (uint32_t i = 0; !status && i <= count; i++) status = add_slab(&s, i);
+    if (radii->plain || LATHE_TUBES_ONLY) {
+        for (uint32_t i = 0; joints && !LATHE_TUBES_ONLY && !status && i <= count; i++) group_slab(&s, i);
+        for (uint32_t i = 0; !status && i <= count; i++)
+            if (!joints || needs_proof(&s, i)) status = add_plain_slab(&s, i);
+    } else {
+        if (!status) memset(s.group[count + 1], 0, sizeof *s.group);
+        for (uint32_t i = 0; !status && i <= count; i++) group_slab(&s, i);
+        for (uint32_t i = 0; !status && i <= count; i++) status = add_slab(&s, i);
+    }
     if (status) lathe_mesh_free(&s.builder.mesh);
     else *out = s.builder.mesh;
+    return status;
+}
+
+bool lathe__radii_plain(const lathe_radii *radii) { return radii->simple || radii->plain || is_one_tube(radii); }
+
+lathe_status lathe__radii_joints(lathe_mesh *out, lathe_arena arena[2], lathe_radii *radii, uint32_t level) {
+    lathe_surface_counts counts = {0};
+    int32_t *slices;
+    uint32_t count, stride;
+    lathe_status status = lathe__radii_slices(&slices, &count, &stride, &arena[0], radii, level);
+    if (!status) status = stack_tubes(out, arena, radii, level, slices, count, stride, true, &counts);
+    lathe__arena_reset(&arena[0]);
+    lathe__arena_reset(&arena[1]);
     return status;
 }
 
@@ -337,7 +480,7 @@ lathe_status lathe__radii_mesh(lathe_mesh *out, lathe_arena arena[2], lathe_radi
             counts->contour_vertices = (uint64_t)counts->rays * count;
             status = lathe__radius_strips(out, &map, slices, count, q);
         } else {
-            status = stack_tubes(out, arena, radii, level, slices, count, stride, counts);
+            status = stack_tubes(out, arena, radii, level, slices, count, stride, false, counts);
         }
     }
     lathe__arena_reset(&arena[0]);

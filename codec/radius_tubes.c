@@ -4,7 +4,7 @@
 /* Numbers of the head, each kind with its own context. */
 enum { HEAD_FORM, HEAD_COUNT, HEAD_STEP, HEAD_FALL, HEAD_FINE, HEAD_TURN, HEAD_APEX, HEAD_FIRST, HEAD_ROWS, HEAD_RAYS, HEAD_HOLE, HEAD_AHEAD, HEAD_EARLY,
        HEAD_GAP, HEAD_KINDS };
-enum { FORM_TUBES = 5, FORM_TUBES_MORE = 6, USUAL_STEP = 32, USUAL_FALL = 6, USUAL_LOG_RAYS = 6, MOST_SAMPLES = 1 << 22, MOST_STEP = 1 << 16 };
+enum { FORM_TUBES = 5, FORM_TUBES_MORE = 6, FORM_TUBES_PLAIN = 7, USUAL_STEP = 32, USUAL_FALL = 6, USUAL_LOG_RAYS = 6, MOST_SAMPLES = 1 << 22, MOST_STEP = 1 << 16 };
 
 typedef struct head {
     lathe_radii *radii;
@@ -12,8 +12,10 @@ typedef struct head {
     lathe_number_coder coder;
     lathe_number_model models[HEAD_KINDS];
     lathe_radius_map common;   /* what all tubes share */
-    bool more;                 /* FORM_TUBES_MORE */
+    bool more;                 /* not FORM_TUBES */
 } head;
+
+static const lathe_radii *truth_of(const head *h) { return LATHE_RADII_ENCODE ? h->truth : NULL; }
 
 static void start_number(lathe_number_model *m, uint32_t not_zero, uint32_t longer) {
     for (int k = 0; k < LATHE_NUMBER_MODELS; k++) {
@@ -23,7 +25,7 @@ static void start_number(lathe_number_model *m, uint32_t not_zero, uint32_t long
 }
 
 static int32_t number(head *h, int kind, int32_t usual, int32_t truth) {
-    return usual + lathe__code_number(&h->coder, &h->models[kind], h->truth ? truth - usual : 0);
+    return usual + lathe__code_number(&h->coder, &h->models[kind], truth_of(h) ? truth - usual : 0);
 }
 
 uint32_t lathe__tube_passes(int32_t rows, uint32_t level_count) {
@@ -35,7 +37,7 @@ uint32_t lathe__tube_passes(int32_t rows, uint32_t level_count) {
 static lathe_status start_simple(head *h, lathe_arena *arena, int32_t form) {
     lathe_radii *radii = h->radii;
     lathe_radius_map *map = &radii->tubes[0].map;
-    const lathe_radius_map *t = h->truth ? &h->truth->tubes[0].map : NULL;
+    const lathe_radius_map *t = truth_of(h) ? &h->truth->tubes[0].map : NULL;
     if (form < -3 || form > 4) return LATHE_ERR_FORMAT;
     *map = (lathe_radius_map){.slices = radii->slices, .level_count = radii->level_count, .rays = 64u << (form + 3) >> 3, .fall = 6, .start = {0, 0, 16 * LATHE_RADIUS_ONE},
                               .farthest = (radii->width + radii->height) * LATHE_RADIUS_ONE};
@@ -60,7 +62,7 @@ static int32_t first_number(const lathe_radius_tube *tube, const lathe_radius_tu
 static lathe_status code_tube(head *h, uint32_t index) {
     lathe_radii *radii = h->radii;
     lathe_radius_tube *tube = &radii->tubes[index], *before = index ? tube - 1 : NULL;
-    const lathe_radius_tube *t = h->truth ? &h->truth->tubes[index] : NULL;
+    const lathe_radius_tube *t = truth_of(h) ? &h->truth->tubes[index] : NULL;
     int32_t from = before ? before->first : 0, n = number(h, HEAD_FIRST, 0, t ? first_number(t, t == h->truth->tubes ? NULL : t - 1) : 0);
     if (n < 0 || n > radii->slices) return LATHE_ERR_FORMAT;
     tube->first = n == 1 && before ? from + before->map.slices : n ? from + n - 1 : from;
@@ -98,7 +100,7 @@ static int32_t next_early(const lathe_radii *radii, int32_t slice) {
 /* Ascending; each as what it is above the one before, at first above -1; 0 ends the list. */
 static lathe_status code_early(head *h, lathe_arena *arena) {
     lathe_radii *radii = h->radii;
-    const lathe_radii *t = h->truth;
+    const lathe_radii *t = truth_of(h);
     int32_t level = number(h, HEAD_EARLY, 0, t ? (int32_t)t->early_level : 0), slice = -1;
     if (level < 0 || level >= (int32_t)radii->level_count) return LATHE_ERR_FORMAT;
     radii->early_level = (uint32_t)level;
@@ -115,7 +117,7 @@ static lathe_status code_early(head *h, lathe_arena *arena) {
 }
 
 static lathe_status code_more(head *h, lathe_arena *arena) {
-    const lathe_radius_map *truth = h->truth ? &h->truth->tubes[0].map : NULL;
+    const lathe_radius_map *truth = truth_of(h) ? &h->truth->tubes[0].map : NULL;
     int32_t ahead = number(h, HEAD_AHEAD, 0, truth ? (int32_t)truth->ahead : 0);
     if (ahead < 0 || ahead > LATHE_RADIUS_MOST_AHEAD) return LATHE_ERR_FORMAT;
     h->common.ahead = (uint32_t)ahead;
@@ -124,7 +126,7 @@ static lathe_status code_more(head *h, lathe_arena *arena) {
 
 static lathe_status start_tubes(head *h, lathe_arena *arena) {
     lathe_radii *radii = h->radii;
-    const lathe_radii *t = h->truth;
+    const lathe_radii *t = truth_of(h);
     lathe_radius_map *common = &h->common;
     const lathe_radius_map *truth = t ? &t->tubes[0].map : NULL;
     int32_t count = number(h, HEAD_COUNT, 1, t ? (int32_t)t->count : 0), fall, samples = 0;
@@ -165,6 +167,7 @@ static lathe_status start_tubes(head *h, lathe_arena *arena) {
 static int32_t form_of(const lathe_radii *truth) {
     const lathe_radius_map *map = &truth->tubes[0].map;
     if (truth->simple) return __builtin_ctz(map->rays) - 6;
+    if (truth->plain) return FORM_TUBES_PLAIN;
     return map->ahead || truth->early_level ? FORM_TUBES_MORE : FORM_TUBES;
 }
 
@@ -174,8 +177,9 @@ static lathe_status code_head(lathe_radii *radii, const lathe_radii *truth, lath
     radii->tubes = LATHE_NEW(arena, lathe_radius_tube, LATHE_TUBES_MOST);
     if (!radii->tubes) return LATHE_ERR_MEMORY;
     memset(radii->tubes, 0, LATHE_TUBES_MOST * sizeof *radii->tubes);
-    int32_t form = number(&h, HEAD_FORM, 0, truth ? form_of(truth) : 0);
-    h.more = form == FORM_TUBES_MORE;
+    int32_t form = number(&h, HEAD_FORM, 0, truth_of(&h) ? form_of(truth) : 0);
+    radii->plain = form == FORM_TUBES_PLAIN;
+    h.more = radii->plain || form == FORM_TUBES_MORE;
     radii->simple = form != FORM_TUBES && !h.more;
     radii->count = 1;
     return radii->simple ? start_simple(&h, arena, form) : start_tubes(&h, arena);
@@ -217,7 +221,7 @@ lathe_radius_map lathe__tube_shown(lathe_radius_tube *tube, uint32_t passes) {
 static lathe_status code_tubes(lathe_radii *radii, const lathe_radii *truth, uint32_t level, lathe_number_code *code, void *coder) {
     for (uint32_t i = 0; i < radii->count; i++) {
         lathe_radius_tube *tube = &radii->tubes[i];
-        lathe_number_coder c = {code, coder, truth ? &truth->tubes[i].map : NULL};
+        lathe_number_coder c = {code, coder, LATHE_RADII_ENCODE && truth ? &truth->tubes[i].map : NULL};
         uint32_t last = tube->map.level_count - radii->level_count + level, pass = level ? last : 0;
         if (!level) start_from(tube, radii);
         for (; pass <= last; pass++) {
@@ -234,6 +238,6 @@ lathe_status lathe__radii_code(lathe_radii *radii, const lathe_radii *truth, lat
                                void *coder) {
     lathe_status status = level ? LATHE_OK : code_head(radii, truth, arena, code, coder);
     if (status) return status;
-    lathe_number_coder c = {code, coder, truth ? &truth->tubes[0].map : NULL};
+    lathe_number_coder c = {code, coder, LATHE_RADII_ENCODE && truth ? &truth->tubes[0].map : NULL};
     return radii->simple ? lathe__radius_walk(&radii->tubes[0].map, level, &c) : code_tubes(radii, truth, level, code, coder);
 }

@@ -20,6 +20,7 @@ typedef struct lathe_radii {
     int32_t slices, width, height;
     uint32_t level_count;
     bool simple;
+    bool plain;                /* tubes are joined ring to ring where they end, never by the overlay */
     uint32_t count;
     int32_t step, fine_step;   /* index: lathe__tube_step; all tubes have these, and turn, fall and apex of the first */
     uint32_t fine_level;       /* the first one with fine_step; 0: none */
@@ -47,6 +48,10 @@ lathe_radius_map lathe__tube_shown(lathe_radius_tube *tube, uint32_t passes);
 /* radius_stack.c: the surface at a level that has been coded. arena: two scratch arenas, left reset. */
 lathe_status lathe__radii_mesh(lathe_mesh *out, lathe_arena arena[2], lathe_radii *radii, uint32_t level,
                                lathe_surface_counts *counts, uint32_t *shown);
+/* Of plain tubes, an encoder's: the triangles of all slabs of which it is not known that nothing in them can cross. */
+lathe_status lathe__radii_joints(lathe_mesh *out, lathe_arena arena[2], lathe_radii *radii, uint32_t level);
+/* Can be meshed without the overlay: one tube all along, or plain ones. */
+bool lathe__radii_plain(const lathe_radii *radii);
 /* The slices that a level shows, ascending, and the stride of its rays. Arena memory. Not of simple maps. */
 lathe_status lathe__radii_slices(int32_t **out, uint32_t *count, uint32_t *ray_stride, lathe_arena *arena, const lathe_radii *radii,
                                  uint32_t level);
@@ -62,6 +67,12 @@ void lathe__radius_ring(int32_t (*v)[3], ptrdiff_t step, lathe_ray_fan *fan, con
 /* The 2 * rays triangles between two rings of vertices, each quadrangle by its shorter diagonal: an even triangle has two vertices of
  * the lower ring, an odd one two of the upper. */
 void lathe__radius_strip(uint32_t (*triangles)[3], const int32_t (*at)[3], uint32_t lower, uint32_t upper, uint32_t rays);
+/* radius_joint.c: between rings of a lower and of an upper slice, all the same way round, a surface that joins them all: several of a
+ * slice are made one by going from each to the next and back where they are nearest. So many triangles as the rings have edges, and two
+ * for each way between rings; a side may be a single vertex instead. */
+typedef struct lathe_ring_chain { uint32_t *vertices, count; } lathe_ring_chain;
+void lathe__chain_ring(lathe_ring_chain *chain, const int32_t (*at)[3], uint32_t first, uint32_t rays);
+lathe_status lathe__join_chains(lathe_mesh *mesh, lathe_arena *arena, const lathe_ring_chain *lower, const lathe_ring_chain *upper);
 /* radius_mesh.c: strips between rows of a map that reaches from the first slice to the last, and two fans. */
 lathe_status lathe__radius_strips(lathe_mesh *out, const lathe_radius_map *map, const int32_t *rows, uint32_t count, uint32_t stride);
 #endif

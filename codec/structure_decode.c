@@ -90,7 +90,8 @@ static lathe_status decode_radii(lathe_structure_state *state, lathe_range_decod
         *state->radii = lathe__radii_frame(state);
     }
     lathe_status status = lathe__radii_code(state->radii, NULL, &state->arena, level, NULL, d);
-    return !status && d->overrun > 8 ? LATHE_ERR_FORMAT : status;
+    if (!status && (d->overrun > 8 || (LATHE_TUBES_ONLY && !lathe__radii_plain(state->radii)))) return LATHE_ERR_FORMAT;
+    return status;
 }
 
 lathe_status lathe__structure_decode(lathe_structure_state *state, lathe_arena *scratch, lathe_models *models, uint32_t level,
@@ -101,13 +102,15 @@ lathe_status lathe__structure_decode(lathe_structure_state *state, lathe_arena *
     lathe__decoder_start(&d, payload, size);
     lathe_status status;
     bool radii = level ? state->radii != NULL : !(state->flags & LATHE_FLAG_EXACT) && lathe__decode_bit(&d, LATHE_RADIUS_CHANCE);
+    *fault = LATHE_OTHERS;
+    if (LATHE_TUBES_ONLY && !radii) return LATHE_ERR_FORMAT;
     if (level == 0 && !radii) {
         state->plan.early = read_steps((uint32_t)state->plan.slices, &d, LATHE_EARLY_START, LATHE_MAX_LEVELS);
         if (!state->plan.early) return LATHE_ERR_MEMORY;
         state->exact_base = state->flags & LATHE_FLAG_KEEP && lathe__decode_bit(&d, LATHE_NUMBER_START);
     }
     if (radii) {
-        *fault = LATHE_FAULT("radius map");
+        *fault = LATHE_TUBES_ONLY ? LATHE_OTHERS : LATHE_FAULT("radius map");
         status = decode_radii(state, &d, level);
     } else if (level < lathe__first_exact(state)) {
         *fault = LATHE_FAULT("base shape: stars");

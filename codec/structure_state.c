@@ -36,7 +36,7 @@ void lathe__models_start(lathe_models *models, const lathe_header *header) {
     bool shared = header->parameter_count > 1 && header->parameters[1] & LATHE_FLAG_SHARED;
     int64_t most = 0;
     models->widest[0] = models->widest[1] = 3;
-    if (!LATHE_RASTERS_ONLY) lathe__base_models(models->base);
+    if (!LATHE_RASTERS_ONLY && !LATHE_TUBES_ONLY) lathe__base_models(models->base);
     for (uint32_t i = 0; shared && i < header->structure_count; i++) {
         const int32_t *size = header->structures[i].size;
         if ((int64_t)size[0] * size[1] <= most) continue;
@@ -48,7 +48,7 @@ void lathe__models_start(lathe_models *models, const lathe_header *header) {
 
 lathe_status lathe__state_start_occupancy(lathe_structure_state *state, lathe_models *models) {
     lathe_status status = LATHE_OK;
-    bool sure = LATHE_RASTERS_ONLY || (state->pyramid && state->flags & LATHE_FLAG_SURE);
+    bool sure = LATHE_RASTERS_ONLY || (lathe__is_pyramid(state) && state->flags & LATHE_FLAG_SURE);
     if (!models->occupancy) status = lathe__occupancy_new(&models->occupancy, models->widest[0], models->widest[1], sure);
     if (status) return status;
     if (!(state->flags & LATHE_FLAG_SHARED))
@@ -209,7 +209,7 @@ lathe_status lathe__state_mesh(lathe_mesh *out, lathe_arena arena[2], const lath
                                lathe_surface_counts *counts, uint32_t *shown) {
     *counts = (lathe_surface_counts){0};
     if (!lathe__state_known(state)) return LATHE_ERR_RANGE;
-    if (state->radii && !LATHE_RASTERS_ONLY) return lathe__radii_mesh(out, arena, state->radii, (uint32_t)state->level, counts, shown);
+    if (lathe__is_radii(state)) return lathe__radii_mesh(out, arena, state->radii, (uint32_t)state->level, counts, shown);
     lathe_status status;
     if (LATHE_RASTERS_ONLY) {
         status = raster_mesh(out, arena, state, NULL, counts, shown);

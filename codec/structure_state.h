@@ -43,6 +43,9 @@ typedef struct lathe_structure_state {
 /* Is there anything to show? */
 static inline bool lathe__state_known(const lathe_structure_state *state) { return state->level >= 0 || state->raster.bits; }
 void lathe__state_free(lathe_structure_state *state);
+/* What it is made of: a small decoder knows. */
+static inline bool lathe__is_pyramid(const lathe_structure_state *state) { return LATHE_RASTERS_ONLY || (!LATHE_TUBES_ONLY && state->pyramid); }
+static inline bool lathe__is_radii(const lathe_structure_state *state) { return LATHE_TUBES_ONLY || (!LATHE_RASTERS_ONLY && state->radii); }
 
 /* The first level whose packet has slices. */
 static inline uint32_t lathe__first_exact(const lathe_structure_state *state) { return !state->exact_base; }

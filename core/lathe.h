@@ -100,4 +100,10 @@ enum { LATHE_RASTERS_ONLY = 1 };
 #else
 enum { LATHE_RASTERS_ONLY = 0 };
 #endif
+/* A decoder of single radius maps and plain tubes alone (FORMAT.md: Tubes). */
+#ifdef LATHE_TUBES
+enum { LATHE_TUBES_ONLY = 1 };
+#else
+enum { LATHE_TUBES_ONLY = 0 };
+#endif
 #endif

@@ -44,10 +44,15 @@ static json_t *json_structures(const lathe_model_info *info) {
     return list;
 }
 
+static const char *decoder_name(const lathe_model *model) {
+    static const char *const names[] = {[LATHE_DECODER_WHOLE] = "whole", [LATHE_DECODER_RASTERS] = "rasters", [LATHE_DECODER_TUBES] = "tubes"};
+    return names[lathe_model_decoder(model)];
+}
+
 int lathe__print_info_json(const lathe_model *model) {
     const lathe_model_info *info = lathe_model_describe(model);
-    json_t *root = json_pack("{s:o, s:o, s:s, s:o}", "structures", json_structures(info), "name", json_name(info->name),
-                             "topology", info->keep_topology ? "keep" : "own", "levels",
+    json_t *root = json_pack("{s:o, s:o, s:s, s:s, s:o}", "structures", json_structures(info), "name", json_name(info->name),
+                             "topology", info->keep_topology ? "keep" : "own", "decoder", decoder_name(model), "levels",
                              json_levels(info->levels, info->level_count));
     if (!root) return lathe__input_error("info: out of memory");
     json_dumpf(root, stdout, JSON_INDENT(1) | JSON_REAL_PRECISION(9));
@@ -91,7 +96,7 @@ static void print_info(const lathe_model *model) {
            (unsigned)info->axis < 3 ? axes[info->axis] : '?', info->boundary == LATHE_BOUNDARY_ISO ? "iso" : "edge");
     if (!isnan(info->iso)) printf(", iso %g", info->iso);
     printf(", topology %s", info->keep_topology ? "of the last level" : "of each level's own");
-    putchar('\n');
+    printf("; decoder: %s\n", decoder_name(model));
     if (info->structure_count != 1) print_table("all structures", info->levels, info->level_count);
     for (uint32_t i = 0; i < info->structure_count; i++) {
         const lathe_structure_info *s = &info->structures[i];

@@ -19,6 +19,12 @@ static lathe_status write_base(lathe_buffer *out, const page *p) {
     return status;
 }
 
+static lathe_status write_decoder(lathe_buffer *out, lathe_small_decoder which) {
+    if (which == LATHE_DECODER_RASTERS) return lathe__buffer_append(out, lathe_rasters_text, lathe_rasters_text_size) ? LATHE_ERR_MEMORY : LATHE_OK;
+    if (which == LATHE_DECODER_TUBES) return lathe__buffer_append(out, lathe_tubes_text, lathe_tubes_text_size) ? LATHE_ERR_MEMORY : LATHE_OK;
+    return lathe__buffer_append(out, lathe_decoder_text, lathe_decoder_text_size) ? LATHE_ERR_MEMORY : LATHE_OK;
+}
+
 static lathe_status write_model(lathe_buffer *out, const page *p) {
     json_t *manifest = lathe__manifest(p->entry, true, p->structure);
     lathe_status status = manifest ? LATHE_OK : LATHE_ERR_MEMORY;
@@ -30,10 +36,7 @@ static lathe_status write_model(lathe_buffer *out, const page *p) {
         status = LATHE_ERR_MEMORY;
     if (!status) status = write_base(out, p);
     if (!status && lathe__buffer_text(out, "</script><script id=\"wasm\" type=\"text/plain\">")) status = LATHE_ERR_MEMORY;
-    bool rasters = lathe_model_describe(p->entry->model)->rasters_only;
-    if (!status && lathe__buffer_append(out, rasters ? lathe_rasters_text : lathe_decoder_text,
-                                        rasters ? lathe_rasters_text_size : lathe_decoder_text_size))
-        status = LATHE_ERR_MEMORY;
+    if (!status) status = write_decoder(out, lathe_model_decoder(p->entry->model));
     if (!status && lathe__buffer_text(out, "</script>")) status = LATHE_ERR_MEMORY;
     return status;
 }

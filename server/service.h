@@ -208,6 +208,8 @@ extern const unsigned char lathe_decoder_text[];   /* a decoder as the page carr
 extern const size_t lathe_decoder_text_size;
 extern const unsigned char lathe_rasters_text[];   /* of models made of rasters */
 extern const size_t lathe_rasters_text_size;
+extern const unsigned char lathe_tubes_text[];     /* of radius maps whose tubes are plain */
+extern const size_t lathe_tubes_text_size;
 extern const unsigned char lathe_extras_js[];
 extern const size_t lathe_extras_js_size;
 extern const unsigned char lathe_draco_html[];

@@ -1,13 +1,13 @@
-// Builds the viewer: node build.mjs [DECODER.wasm [RASTERS.wasm [VIEWER.html]]]. One page with style and script in it; beside it the
-// two decoders as text, of which the server puts one into the page: decoder.txt reads every model, rasters.txt those made of rasters.
+// Builds the viewer: node build.mjs [DECODER.wasm [RASTERS.wasm [TUBES.wasm [VIEWER.html]]]]. One page with style and script in it; beside
+// it the decoders as text, of which the server puts one into the page: decoder.txt reads every model, the others those made of rasters or tubes.
 import { build, transform } from 'esbuild';
 import { mkdir, readFile, writeFile } from 'node:fs/promises';
 import { dirname } from 'node:path';
 import { fileURLToPath } from 'node:url';
 
 const here = (path) => fileURLToPath(new URL(path, import.meta.url));
-const [wasmPath = here('../build/wasm/lathe.wasm'), rastersPath = here('../build/wasm/rasters.wasm'), pagePath = here('dist/viewer.html')] =
-    process.argv.slice(2);
+const wasm = (name) => here(`../build/wasm/${name}.wasm`);
+const [wasmPath = wasm('lathe'), rastersPath = wasm('rasters'), tubesPath = wasm('tubes'), pagePath = here('dist/viewer.html')] = process.argv.slice(2);
 const beside = (name) => pagePath.replace(/[^/]*$/, name);
 
 /** Shaders without comments and needless space; preprocessor lines keep their line ends. */
@@ -68,3 +68,4 @@ await mkdir(dirname(pagePath), { recursive: true });
 await writeFile(pagePath, page);
 await writeFile(beside('decoder.txt'), textOfBytes(await readFile(wasmPath)));
 await writeFile(beside('rasters.txt'), textOfBytes(await readFile(rastersPath)));
+await writeFile(beside('tubes.txt'), textOfBytes(await readFile(tubesPath)));

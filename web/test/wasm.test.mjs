@@ -1,4 +1,4 @@
-// The wasm decoders in node, of every model and of rasters alone: the same meshes as the native one, and no input that traps them.
+// The wasm decoders in node, of every model, of rasters alone and of tubes alone: the same meshes as the native one, and no input that traps them.
 // LATHE_HASH_STREAM=FILE with LATHE_HASH_EXPECT=FILE (lines as `lathe hash --each` prints them) checks another stream.
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
@@ -15,7 +15,7 @@ const run = promisify(execFile);
 const load = async (path) => WebAssembly.compile(await readFile(path));
 const modules = process.env.LATHE_WASM
     ? { given: await load(process.env.LATHE_WASM) }
-    : { whole: await load('../build/wasm/lathe.wasm'), rasters: await load('../build/wasm/rasters.wasm') };
+    : { whole: await load('../build/wasm/lathe.wasm'), rasters: await load('../build/wasm/rasters.wasm'), tubes: await load('../build/wasm/tubes.wasm') };
 const open = async (module) => (await WebAssembly.instantiate(module)).exports;
 
 function feed(wasm, bytes) {
@@ -132,18 +132,20 @@ for (const [name, module] of Object.entries(modules)) {
     });
 }
 
-test('the decoder of rasters refuses other models with words', { skip: !modules.rasters }, async () => {
-    for (const golden of ['radius', 'keep', 'exact']) {
-        const wasm = await open(modules.rasters);
-        assert.equal(feed(wasm, await readFile(`../tests/golden/${golden}.lathe`)), 0);
-        assert.ok(wasm.step() < 0);
-        const text = new Uint8Array(wasm.memory.buffer, wasm.error_text(), 80);
-        assert.match(new TextDecoder().decode(text.slice(0, text.indexOf(0))), /not made of rasters/);
-        const whole = await open(modules.whole);
-        assert.equal(feed(whole, await readFile(`../tests/golden/${golden}.lathe`)), 0);
-        assert.equal(whole.step(), 0);
-    }
-});
+for (const [small, others] of Object.entries({ rasters: ['radius', 'keep', 'exact'], tubes: ['tubes', 'keep', 'exact', 'cubes'] })) {
+    test(`the decoder of ${small} refuses other models with words`, { skip: !modules[small] }, async () => {
+        for (const golden of others) {
+            const wasm = await open(modules[small]);
+            assert.equal(feed(wasm, await readFile(`../tests/golden/${golden}.lathe`)), 0);
+            assert.ok(wasm.step() < 0);
+            const text = new Uint8Array(wasm.memory.buffer, wasm.error_text(), 80);
+            assert.match(new TextDecoder().decode(text.slice(0, text.indexOf(0))), /made of something else/);
+            const whole = await open(modules.whole);
+            assert.equal(feed(whole, await readFile(`../tests/golden/${golden}.lathe`)), 0);
+            assert.equal(whole.step(), 0);
+        }
+    });
+}
 
 test('the decoder that a page carries reads the model of that page', { skip: !modules.rasters }, async () => {
     const goldens = (await readdir('../tests/golden')).filter((name) => name.endsWith('.lathe'));
@@ -165,5 +167,5 @@ test('the decoder that a page carries reads the model of that page', { skip: !mo
     } finally {
         await server.stop();
     }
-    assert.equal(sizes.size, 2, 'both decoders are carried by some page');
+    assert.equal(sizes.size, 3, 'each decoder is carried by some page');
 });
