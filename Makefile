@@ -32,7 +32,7 @@ FUZZERS := $(basename $(notdir $(wildcard tests/fuzz_*.c)))
 WASM_SOURCES := $(addprefix core/,status.c arena.c ray.c crossing.c contour.c grammar.c tiling.c centre.c grid.c outline.c triangulate.c \
                   overlay.c tube.c builder.c cube_table.c raster_surface.c level.c refinement.c mask.c mesh.c) \
                 $(addprefix codec/,range_decoder.c occupancy_model.c model_state.c occupancy_decode.c base_shape.c base_decode.c radius_map.c radius_mesh.c \
-                  radius_tubes.c radius_stack.c radius_joint.c structure_state.c structure_decode.c pyramid.c pyramid_decode.c archive_parse.c crc32c.c decode.c) \
+                  radius_tubes.c radius_stack.c radius_joint.c radius_group.c structure_state.c structure_decode.c pyramid.c pyramid_decode.c archive_parse.c crc32c.c decode.c) \
                 $(wildcard web/wasm/*.c)
 
 # ---- flags -------------------------------------------------------------------------------------------------------------

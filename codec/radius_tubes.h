@@ -67,12 +67,6 @@ void lathe__radius_ring(int32_t (*v)[3], ptrdiff_t step, lathe_ray_fan *fan, con
 /* The 2 * rays triangles between two rings of vertices, each quadrangle by its shorter diagonal: an even triangle has two vertices of
  * the lower ring, an odd one two of the upper. */
 void lathe__radius_strip(uint32_t (*triangles)[3], const int32_t (*at)[3], uint32_t lower, uint32_t upper, uint32_t rays);
-/* radius_joint.c: between rings of a lower and of an upper slice, all the same way round, a surface that joins them all: several of a
- * slice are made one by going from each to the next and back where they are nearest. So many triangles as the rings have edges, and two
- * for each way between rings; a side may be a single vertex instead. */
-typedef struct lathe_ring_chain { uint32_t *vertices, count; } lathe_ring_chain;
-void lathe__chain_ring(lathe_ring_chain *chain, const int32_t (*at)[3], uint32_t first, uint32_t rays);
-lathe_status lathe__join_chains(lathe_mesh *mesh, lathe_arena *arena, const lathe_ring_chain *lower, const lathe_ring_chain *upper);
 /* radius_mesh.c: strips between rows of a map that reaches from the first slice to the last, and two fans. */
 lathe_status lathe__radius_strips(lathe_mesh *out, const lathe_radius_map *map, const int32_t *rows, uint32_t count, uint32_t stride);
 #endif
