@@ -4,7 +4,8 @@
 /* Numbers of the head, each kind with its own context. */
 enum { HEAD_FORM, HEAD_COUNT, HEAD_STEP, HEAD_FALL, HEAD_FINE, HEAD_TURN, HEAD_APEX, HEAD_FIRST, HEAD_ROWS, HEAD_RAYS, HEAD_HOLE, HEAD_AHEAD, HEAD_EARLY,
        HEAD_GAP, HEAD_KINDS };
-enum { FORM_TUBES = 5, FORM_TUBES_MORE = 6, FORM_TUBES_PLAIN = 7, USUAL_STEP = 32, USUAL_FALL = 6, USUAL_LOG_RAYS = 6, MOST_SAMPLES = 1 << 22, MOST_STEP = 1 << 16 };
+/* Simple maps: log2 rays - 6, to 4. */
+enum { LEAST_FORM = -3, FORM_TUBES = 5, FORM_TUBES_MORE = 6, FORM_TUBES_PLAIN = 7, USUAL_STEP = 32, USUAL_FALL = 6, USUAL_LOG_RAYS = 6, MOST_SAMPLES = 1 << 22, MOST_STEP = 1 << 16 };
 
 typedef struct head {
     lathe_radii *radii;
@@ -13,6 +14,7 @@ typedef struct head {
     lathe_number_model models[HEAD_KINDS];
     lathe_radius_map common;   /* what all tubes share */
     bool more;                 /* not FORM_TUBES */
+    bool wrong;                /* a number is out of range */
 } head;
 
 static const lathe_radii *truth_of(const head *h) { return LATHE_RADII_ENCODE ? h->truth : NULL; }
@@ -24,8 +26,12 @@ static void start_number(lathe_number_model *m, uint32_t not_zero, uint32_t long
     }
 }
 
-static int32_t number(head *h, int kind, int32_t usual, int32_t truth) {
-    return usual + lathe__code_number(&h->coder, &h->models[kind], truth_of(h) ? truth - usual : 0);
+/* From `low` to `high`; coded as its difference from what is usual. */
+static int32_t number(head *h, int kind, int32_t usual, int32_t low, int32_t high, int32_t truth) {
+    int64_t n = (int64_t)usual + lathe__code_number(&h->coder, &h->models[kind], truth_of(h) ? truth - usual : 0);
+    if (n >= low && n <= high) return (int32_t)n;
+    h->wrong = true;
+    return low;
 }
 
 uint32_t lathe__tube_passes(int32_t rows, uint32_t level_count) {
@@ -34,20 +40,21 @@ uint32_t lathe__tube_passes(int32_t rows, uint32_t level_count) {
     return passes < level_count ? level_count : passes;
 }
 
+/* Kinds are those of the two forms. */
+static void code_turn(head *h, lathe_radius_map *map, int turn, int apex) {
+    const lathe_radius_map *t = truth_of(h) ? &h->truth->tubes[0].map : NULL;
+    map->turn = number(h, turn, 0, -32768, 32768, t ? t->turn : 0);
+    for (int k = 0; k < 2; k++) map->apex[k] = number(h, apex, LATHE_APEX_ONE / 2, 1, LATHE_APEX_ONE - 1, t ? t->apex[k] : 0);
+    map->farthest = (h->radii->width + h->radii->height) * LATHE_RADIUS_ONE;
+}
+
 static lathe_status start_simple(head *h, lathe_arena *arena, int32_t form) {
     lathe_radii *radii = h->radii;
     lathe_radius_map *map = &radii->tubes[0].map;
-    const lathe_radius_map *t = truth_of(h) ? &h->truth->tubes[0].map : NULL;
-    if (form < -3 || form > 4) return LATHE_ERR_FORMAT;
-    *map = (lathe_radius_map){.slices = radii->slices, .level_count = radii->level_count, .rays = 64u << (form + 3) >> 3, .fall = 6, .start = {0, 0, 16 * LATHE_RADIUS_ONE},
-                              .farthest = (radii->width + radii->height) * LATHE_RADIUS_ONE};
-    map->step = number(h, HEAD_FORM, 0, t ? t->step : 0);
-    map->turn = number(h, HEAD_FORM, 0, t ? t->turn : 0);
-    for (int k = 0; k < 2; k++) map->apex[k] = number(h, HEAD_FORM, LATHE_APEX_ONE / 2, t ? t->apex[k] : 0);
-    if (map->step < 1 || map->step > MOST_STEP || map->turn < -32768 || map->turn > 32768) return LATHE_ERR_FORMAT;
-    for (int k = 0; k < 2; k++)
-        if (map->apex[k] < 1 || map->apex[k] >= LATHE_APEX_ONE) return LATHE_ERR_FORMAT;
-    return lathe__radius_map_start(map, arena);
+    *map = (lathe_radius_map){.slices = radii->slices, .level_count = radii->level_count, .rays = 64u << (form + 3) >> 3, .fall = 6, .start = {0, 0, 16 * LATHE_RADIUS_ONE}};
+    map->step = number(h, HEAD_FORM, 0, 1, MOST_STEP, truth_of(h) ? h->truth->tubes[0].map.step : 0);
+    code_turn(h, map, HEAD_FORM, HEAD_FORM);
+    return h->wrong ? LATHE_ERR_FORMAT : lathe__radius_map_start(map, arena);
 }
 
 /* ---- the head of tubes ---- */
@@ -59,19 +66,20 @@ static int32_t first_number(const lathe_radius_tube *tube, const lathe_radius_tu
     return tube->first > from ? tube->first - from + 1 : 0;
 }
 
-static lathe_status code_tube(head *h, uint32_t index) {
+static void code_tube(head *h, uint32_t index) {
     lathe_radii *radii = h->radii;
     lathe_radius_tube *tube = &radii->tubes[index], *before = index ? tube - 1 : NULL;
     const lathe_radius_tube *t = truth_of(h) ? &h->truth->tubes[index] : NULL;
-    int32_t from = before ? before->first : 0, n = number(h, HEAD_FIRST, 0, t ? first_number(t, t == h->truth->tubes ? NULL : t - 1) : 0);
-    if (n < 0 || n > radii->slices) return LATHE_ERR_FORMAT;
+    int32_t from = before ? before->first : 0;
+    int32_t n = number(h, HEAD_FIRST, 0, 0, radii->slices, t ? first_number(t, index ? t - 1 : NULL) : 0);
     tube->first = n == 1 && before ? from + before->map.slices : n ? from + n - 1 : from;
-    int32_t least = radii->slices - tube->first, rows = least - number(h, HEAD_ROWS, 0, t ? least - t->map.slices : 0);
-    int32_t log_rays = number(h, HEAD_RAYS, before ? __builtin_ctz(before->map.rays) : USUAL_LOG_RAYS, t ? __builtin_ctz(t->map.rays) : 0);
-    int32_t hole = number(h, HEAD_HOLE, 0, t ? t->hole : 0);
-    if (rows < 1 || rows > least || log_rays < 3 || (uint32_t)1 << log_rays > (radii->count > 1 ? LATHE_TUBE_MOST_RAYS : LATHE_RADIUS_MAX_RAYS))
-        return LATHE_ERR_FORMAT;
-    tube->hole = hole != 0;
+    int32_t left = radii->slices - tube->first;
+    /* What is coded is how many rows there could be more; a tube that begins above the last slice has none. */
+    int32_t rows = left - number(h, HEAD_ROWS, 0, 0, left - 1, t ? left - t->map.slices : 0);
+    int32_t log_rays = number(h, HEAD_RAYS, before ? __builtin_ctz(before->map.rays) : USUAL_LOG_RAYS, 3,
+                              __builtin_ctz(radii->count > 1 ? LATHE_TUBE_MOST_RAYS : LATHE_RADIUS_MAX_RAYS), t ? __builtin_ctz(t->map.rays) : 0);
+    tube->hole = number(h, HEAD_HOLE, 0, INT32_MIN, INT32_MAX, t ? t->hole : 0) != 0;
+    if (h->wrong) return;
     tube->map = h->common;
     tube->map.slices = rows;
     tube->map.level_count = lathe__tube_passes(rows, radii->level_count);
@@ -79,7 +87,6 @@ static lathe_status code_tube(head *h, uint32_t index) {
     tube->map.fine_from = tube->map.level_count - radii->level_count + radii->fine_level;
     tube->map.early = radii->early_level ? radii->early + tube->first : NULL;
     tube->map.early_with = tube->map.level_count - radii->level_count + radii->early_level - 1;
-    return LATHE_OK;
 }
 
 /* Tubes share their contexts. */
@@ -101,27 +108,16 @@ static int32_t next_early(const lathe_radii *radii, int32_t slice) {
 static lathe_status code_early(head *h, lathe_arena *arena) {
     lathe_radii *radii = h->radii;
     const lathe_radii *t = truth_of(h);
-    int32_t level = number(h, HEAD_EARLY, 0, t ? (int32_t)t->early_level : 0), slice = -1;
-    if (level < 0 || level >= (int32_t)radii->level_count) return LATHE_ERR_FORMAT;
-    radii->early_level = (uint32_t)level;
-    if (!level) return LATHE_OK;
+    radii->early_level = (uint32_t)number(h, HEAD_EARLY, 0, 0, (int32_t)radii->level_count - 1, t ? (int32_t)t->early_level : 0);
+    if (!radii->early_level) return LATHE_OK;
     radii->early = LATHE_NEW(arena, bool, radii->slices);
     if (!radii->early) return LATHE_ERR_MEMORY;
     memset(radii->early, 0, (size_t)radii->slices * sizeof *radii->early);
-    for (;;) {
-        int32_t next = t ? next_early(t, slice + 1) : 0, gap = number(h, HEAD_GAP, 0, t && next >= 0 ? next - slice : 0);
+    for (int32_t slice = -1, gap;; radii->early[slice += gap] = true) {
+        int32_t next = t ? next_early(t, slice + 1) : 0;
+        gap = number(h, HEAD_GAP, 0, 0, radii->slices - slice - 1, t && next >= 0 ? next - slice : 0);
         if (!gap) return LATHE_OK;
-        if (gap < 0 || gap >= radii->slices - slice) return LATHE_ERR_FORMAT;
-        radii->early[slice += gap] = true;
     }
-}
-
-static lathe_status code_more(head *h, lathe_arena *arena) {
-    const lathe_radius_map *truth = truth_of(h) ? &h->truth->tubes[0].map : NULL;
-    int32_t ahead = number(h, HEAD_AHEAD, 0, truth ? (int32_t)truth->ahead : 0);
-    if (ahead < 0 || ahead > LATHE_RADIUS_MOST_AHEAD) return LATHE_ERR_FORMAT;
-    h->common.ahead = (uint32_t)ahead;
-    return code_early(h, arena);
 }
 
 static lathe_status start_tubes(head *h, lathe_arena *arena) {
@@ -129,39 +125,29 @@ static lathe_status start_tubes(head *h, lathe_arena *arena) {
     const lathe_radii *t = truth_of(h);
     lathe_radius_map *common = &h->common;
     const lathe_radius_map *truth = t ? &t->tubes[0].map : NULL;
-    int32_t count = number(h, HEAD_COUNT, 1, t ? (int32_t)t->count : 0), fall, samples = 0;
-    radii->step = number(h, HEAD_STEP, USUAL_STEP, t ? t->step : 0);
-    fall = number(h, HEAD_FALL, USUAL_FALL, truth ? (int32_t)truth->fall : 0);
-    int32_t fine = number(h, HEAD_FINE, 0, t ? (int32_t)t->fine_level : 0), finer = fine ? number(h, HEAD_STEP, 0, t ? t->step - t->fine_step : 0) : 0;
-    common->turn = number(h, HEAD_TURN, 0, truth ? truth->turn : 0);
-    for (int k = 0; k < 2; k++) common->apex[k] = number(h, HEAD_APEX, LATHE_APEX_ONE / 2, truth ? truth->apex[k] : 0);
-    if (count < 1 || count > LATHE_TUBES_MOST || radii->step < 0 || radii->step >= LATHE_TUBE_STEPS || fall < 3 || fall > 8 ||
-        fine < 0 || (uint32_t)fine >= radii->level_count || finer > radii->step || finer <= radii->step - LATHE_TUBE_STEPS || common->turn < -32768 || common->turn > 32768)
-        return LATHE_ERR_FORMAT;
-    for (int k = 0; k < 2; k++)
-        if (common->apex[k] < 1 || common->apex[k] >= LATHE_APEX_ONE) return LATHE_ERR_FORMAT;
+    radii->count = (uint32_t)number(h, HEAD_COUNT, 1, 1, LATHE_TUBES_MOST, t ? (int32_t)t->count : 0);
+    radii->step = number(h, HEAD_STEP, USUAL_STEP, 0, LATHE_TUBE_STEPS - 1, t ? t->step : 0);
+    common->fall = (uint32_t)number(h, HEAD_FALL, USUAL_FALL, 3, 8, truth ? (int32_t)truth->fall : 0);
+    radii->fine_level = (uint32_t)number(h, HEAD_FINE, 0, 0, (int32_t)radii->level_count - 1, t ? (int32_t)t->fine_level : 0);
+    radii->fine_step = radii->step;
+    if (radii->fine_level) radii->fine_step -= number(h, HEAD_STEP, 0, radii->step - (LATHE_TUBE_STEPS - 1), radii->step, t ? t->step - t->fine_step : 0);
+    code_turn(h, common, HEAD_TURN, HEAD_APEX);
     common->tube = true;
     common->step = lathe__tube_step(radii->step);
-    common->fall = (uint32_t)fall;
-    radii->fine_level = (uint32_t)fine;
-    radii->fine_step = radii->step - finer;
-    common->fine_step = fine ? lathe__tube_step(radii->fine_step) : 0;
-    common->farthest = (radii->width + radii->height) * LATHE_RADIUS_ONE;
-    lathe_status more = h->more ? code_more(h, arena) : LATHE_OK;
-    if (more) return more;
-    radii->count = (uint32_t)count;
-    for (uint32_t i = 0; i < radii->count; i++) {
-        lathe_status status = code_tube(h, i);
-        if (status) return status;
-        int64_t more = (int64_t)radii->tubes[i].map.slices * radii->tubes[i].map.rays;
-        if (more > MOST_SAMPLES - samples) return LATHE_ERR_FORMAT;
-        samples += (int32_t)more;
+    common->fine_step = radii->fine_level ? lathe__tube_step(radii->fine_step) : 0;
+    lathe_status status = LATHE_OK;
+    if (h->more) {
+        common->ahead = (uint32_t)number(h, HEAD_AHEAD, 0, 0, LATHE_RADIUS_MOST_AHEAD, truth ? (int32_t)truth->ahead : 0);
+        status = code_early(h, arena);
     }
-    for (uint32_t i = 0; i < radii->count; i++) {
-        lathe_status status = allocate(&radii->tubes[i], arena, radii->tubes[0].map.models);
-        if (status) return status;
+    int64_t samples = 0;
+    for (uint32_t i = 0; !status && i < radii->count; i++) {
+        code_tube(h, i);
+        samples += (int64_t)radii->tubes[i].map.slices * radii->tubes[i].map.rays;
+        if (h->wrong || samples > MOST_SAMPLES) status = LATHE_ERR_FORMAT;
     }
-    return LATHE_OK;
+    for (uint32_t i = 0; !status && i < radii->count; i++) status = allocate(&radii->tubes[i], arena, radii->tubes[0].map.models);
+    return status;
 }
 
 static int32_t form_of(const lathe_radii *truth) {
@@ -177,11 +163,11 @@ static lathe_status code_head(lathe_radii *radii, const lathe_radii *truth, lath
     radii->tubes = LATHE_NEW(arena, lathe_radius_tube, LATHE_TUBES_MOST);
     if (!radii->tubes) return LATHE_ERR_MEMORY;
     memset(radii->tubes, 0, LATHE_TUBES_MOST * sizeof *radii->tubes);
-    int32_t form = number(&h, HEAD_FORM, 0, truth_of(&h) ? form_of(truth) : 0);
+    int32_t form = number(&h, HEAD_FORM, 0, LEAST_FORM, FORM_TUBES_PLAIN, truth_of(&h) ? form_of(truth) : 0);
+    radii->simple = form < FORM_TUBES;
     radii->plain = form == FORM_TUBES_PLAIN;
-    h.more = radii->plain || form == FORM_TUBES_MORE;
-    radii->simple = form != FORM_TUBES && !h.more;
     radii->count = 1;
+    h.more = form != FORM_TUBES;
     return radii->simple ? start_simple(&h, arena, form) : start_tubes(&h, arena);
 }
 

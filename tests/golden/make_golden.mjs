@@ -149,4 +149,15 @@ bake('cubes_independent', raw('cubes_independent', [56, 37, 29], label, [1, 1, 1
 bake('cubes_thick', raw('cubes_thick', [60, 50, 7], (x, y, z) => ball(x - 30, y - 25, 6 * (z - 3), 22) + 3 * rough(x, y, 6 * z), [0.5, 0.7, 4]), '--iso', '0', '--exact');
 bake('cubes_specks', raw('cubes_specks', [40, 40, 40], (x, y, z) => (ball(x - 14, y - 15, z - 15, 12) > 0 ? 1 : x === 38 && y === 3 && z === 9 ? 2 : 0)), '--labels', 'all');
 bake('cubes_slice', raw('cubes_slice', [40, 32, 1], (x, y) => ball(x - 18, y - 16, 0, 13) + 3 * rough(x, y, 3)), '--iso', '0', '--exact');
+/* Plain tubes (older streams of several tubes were baked before there were those: today the same calls give them): a hole that parts, in a trunk
+ * where it is open below; one solid that becomes three, and two that become one; a plate with two holes through it. */
+bake('plain_hole', raw('plain_hole', [46, 46, 44], (x, y, z) => Math.min(trunk(x, y, z), -Math.min(vessel(x, y, z), 36 - z))), '--iso', '0');
+const blend = (a, b) => Math.max(a, b) + Math.max(5 - Math.abs(a - b), 0) ** 2 / 20;
+const rods = (x, y, ...at) => at.map(([u, v, r]) => r - Math.hypot(x - u, y - v)).reduce(blend);
+const opened = (z) => Math.max(0, z - 25);
+bake('plain_parts', raw('plain_parts', [70, 70, 60], (x, y, z) => Math.min(z - 3, 56 - z,
+    rods(x, y, [35 - opened(z) / 2, 35, 6], [35 + opened(z) / 3, 35 - opened(z) / 2, 6], [35 + opened(z) / 3, 35 + opened(z) / 2, 6]))), '--iso', '0');
+const merged = (z) => Math.max(0, 30 - z) / 2;
+bake('plain_merges', raw('plain_merges', [60, 46, 60], (x, y, z) => Math.min(z - 3, 56.4 - z, rods(x, y, [30 - merged(z), 23, 7.2], [30 + merged(z), 20, 6.6]))), '--iso', '0');
+bake('plain_plate', raw('plain_plate', [70, 50, 40], (x, y, z) => Math.min(20 - Math.hypot((x - 35) * 0.65, y - 25), z - 4, 36 - z, Math.hypot(x - 24, y - 25) - 5, Math.hypot(x - 46, y - 25) - 4.6)), '--iso', '0');
 rmSync(scratch, { recursive: true });

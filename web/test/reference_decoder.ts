@@ -734,7 +734,7 @@ export class SimpleMap {
 
 export interface Tube { first: number; rows: number; rays: number; hole: boolean; image: RadiusImage | null }
 
-/** Several of them, or one with more to say. */
+/** Several of them, or one with more to say; `form` is 5, 6 or 7. */
 export class Tubes {
     /** Numbers of the steps, and the steps. */
     readonly steps: number[];
@@ -748,11 +748,12 @@ export class Tubes {
     /** The level that has early slices, or -1; and those. */
     readonly earlyLevel: number = -1;
     readonly early: number[] = [];
+    readonly plain: boolean;
     readonly tubes: Tube[] = [];
     private readonly contexts = new RadiusContexts();
     private readonly kinds = new Map<string, NumberContext>();
 
-    constructor(d: RangeDecoder, more: boolean, private readonly plan: Plan, private readonly box: number[]) {
+    constructor(d: RangeDecoder, form: number, private readonly plan: Plan, private readonly box: number[]) {
         const number = (kind: string): number => {
             if (!this.kinds.has(kind)) this.kinds.set(kind, new NumberContext(2));
             return (this.kinds.get(kind) as NumberContext).read(d);
@@ -771,7 +772,8 @@ export class Tubes {
         this.steps = [k, fine];
         this.turn = within(number('turn'), -32768, 32768, 'the turn');
         this.apex = [0, 1].map(() => within(4 + number('apex'), 1, 7, 'an apex'));
-        if (more) {
+        this.plain = form === 7;
+        if (form !== 5) {
             this.ahead = within(number('ahead'), 0, 12, 'how far rays are ahead');
             this.earlyLevel = within(number('early'), 0, plan.levelCount - 1, 'the level of early slices') - 1;
             for (let slice = -1, gap = 1; this.earlyLevel >= 0 && gap;) {
@@ -851,9 +853,126 @@ export interface Mesh { vertices: number[][]; triangles: number[][] }
 export function radiusMesh(packet: Packet & { kind: 'radii' }, level: number): Mesh | null {
     const { map } = packet;
     if (map instanceof SimpleMap) return stripMesh(map.image, map.turn, map.apex, map.image.rows(level), map.image.rayStride(level));
-    if (!map.single) return null;
+    if (!map.single) return map.plain ? new PlainTubes(map, level).mesh : null;
     const s = map.shownSlices(level), rays = map.tubes[0].rays, stride = Math.max(Math.floor(map.strideAt(level) / 2 / 2 ** map.ahead), 1);
     return stripMesh(map.shown(map.tubes[0], level), map.turn, map.apex, s, Math.min(stride, rays / 8));
+}
+
+const square = (p: number[], q: number[]): bigint => [0, 1].reduce((sum, k) => sum + BigInt(p[k] - q[k]) ** 2n, 0n);
+
+/** Of a lower ring a, b and an upper one, counter-clockwise: two triangles for each pair of neighbours. */
+function strip(mesh: Mesh, lower: number[], upper: number[]): void {
+    const at = mesh.vertices, n = lower.length;
+    for (let k = 0; k < n; k++) {
+        const [a, b, c, e] = [lower[k], lower[(k + 1) % n], upper[(k + 1) % n], upper[k]];
+        if (square(at[a], at[c]) <= square(at[b], at[e])) mesh.triangles.push([a, b, c], [a, c, e]);
+        else mesh.triangles.push([a, b, e], [b, c, e]);
+    }
+}
+
+interface Ring { tube: number; hole: boolean; centre: number[]; most: number; vertices: number[] }
+
+class PlainTubes {
+    readonly mesh: Mesh = { vertices: [], triangles: [] };
+    private readonly slices: number[];
+    private readonly rings: Ring[][];   /* of each shown slice */
+
+    constructor(private readonly map: Tubes, level: number) {
+        this.slices = map.shownSlices(level);
+        const stride = Math.max(Math.floor(map.strideAt(level) / 2 / 2 ** map.ahead), 1), images = map.tubes.map((tube) => map.shown(tube, level));
+        this.rings = this.slices.map((w) => map.tubes.flatMap((tube, i) => {
+            const row = w - tube.first;
+            return row >= 0 && row < tube.rows ? [this.ring(tube, i, images[i], row, w, Math.min(stride, tube.rays / 8))] : [];
+        }));
+        for (let i = 0; i <= this.slices.length; i++) this.slab(i);
+    }
+
+    private ring(tube: Tube, index: number, image: RadiusImage, row: number, w: number, q: number): Ring {
+        const centre = image.centres[row].map((c) => c * 32768), vertices: number[] = [];
+        let most = 0;
+        for (let k = 0; k < tube.rays; k += q) {
+            const i = tube.hole ? tube.rays - q - k : k, turned = (((i * (65536 / tube.rays) + this.map.turn * row) % 65536) + 65536) % 65536;
+            const d = direction(turned, 65536);
+            most = Math.max(most, image.radii[row][i]);
+            vertices.push(this.mesh.vertices.length);
+            this.mesh.vertices.push([...[0, 1].map((c) => 2 * Math.floor((centre[c] + Math.trunc((image.radii[row][i] * 1024 * d[c]) / 16384)) / 2)), w * 65536]);
+        }
+        return { tube: index, hole: tube.hole, centre, most: most * 1025, vertices };
+    }
+
+    private slab(i: number): void {
+        const sides = [this.rings[i - 1] ?? [], this.rings[i] ?? []], tubes = this.map.tubes.map((_, t) => sides.map((rings) => rings.find((r) => r.tube === t)));
+        const single = tubes.flatMap(([a, b], t) => (!a === !b ? [] : [t])), joint = new Map(single.map((t) => [t, [t]])), over = new Set<number>();
+        const ringOf = (t: number): Ring => (tubes[t][0] ?? tubes[t][1]) as Ring;
+        const areOver = (t: number, u: number): boolean => {
+            const [p, q] = [ringOf(t), ringOf(u)], x = p.centre[0] - q.centre[0], y = p.centre[1] - q.centre[1], most = Math.max(p.most, q.most);
+            return x * x + y * y < most * most;
+        };
+        const merge = (t: number, u: number): void => {
+            const all = [...new Set([...(joint.get(t) as number[]), ...(joint.get(u) as number[])])].sort((a, b) => a - b);
+            for (const k of all) joint.set(k, all);
+        };
+        const sameSide = (t: number, u: number): boolean => !tubes[t][0] === !tubes[u][0], alike = (t: number, u: number): boolean => ringOf(t).hole === ringOf(u).hole;
+        if (this.slices[i] - this.slices[i - 1] === 1)
+            for (const t of single) for (const u of single) if (!sameSide(t, u) && alike(t, u) && areOver(t, u)) { merge(t, u); over.add(t).add(u); }
+        for (const t of single) for (const u of single)
+            if (!over.has(t) && !over.has(u) && sameSide(t, u) && !alike(t, u) && areOver(t, u)) merge(t, u);
+        tubes.forEach(([a, b], t) => {
+            if (a && b) strip(this.mesh, a.vertices, b.vertices);
+            else if ((a || b) && (joint.get(t) as number[])[0] === t) this.join(joint.get(t) as number[], tubes, over.has(t));
+        });
+    }
+
+    private join(members: number[], tubes: (Ring | undefined)[][], over: boolean): void {
+        const chains: number[][] = [[], []], at = this.mesh.vertices;
+        if (over) for (const side of [0, 1]) for (const t of members) this.walkAround(chains[side], tubes[t][side]?.vertices ?? []);
+        else {
+            const side = tubes[members[0]][0] ? 0 : 1, alone = members.length === 1, rise = 8192 * this.map.apex[1 - side] * (side ? -1 : 1);
+            for (const t of members) {
+                const { vertices, centre, hole } = tubes[t][side] as Ring, inner = !alone && hole;
+                const rim = vertices.map((v) => at.push([...[0, 1].map((k) => at[v][k] + Math.trunc((at[v][k] - centre[k]) / (inner ? 8 : -8))), at[v][2] + rise]) - 1);
+                strip(this.mesh, side ? rim : vertices, side ? vertices : rim);
+                this.walkAround(chains[inner ? 1 - side : side], rim);
+                if (alone) chains[1 - side].push(at.push([...centre, at[rim[0]][2]]) - 1);
+            }
+            chains[1 - side].reverse();
+        }
+        this.tile(chains[0], chains[1]);
+    }
+
+    private nearest(p: number[], q: number[]): number[] {
+        let least: bigint | null = null, found = [0, 0];
+        p.forEach((a, i) => q.forEach((b, k) => {
+            const d = square(this.mesh.vertices[a], this.mesh.vertices[b]);
+            if (least === null || d < least) [least, found] = [d, [i, k]];
+        }));
+        return found;
+    }
+
+    private walkAround(chain: number[], ring: number[]): void {
+        if (!chain.length || !ring.length) return void chain.push(...ring);
+        const [i, j] = this.nearest(chain, ring);
+        chain.splice(i + 1, 0, ...ring.slice(j), ...ring.slice(0, j), ring[j], chain[i]);
+    }
+
+    private tile(a: number[], b: number[]): void {
+        const [f, g] = this.nearest(a, b), m = a.length, n = b.length, rows = m > 1 ? m : 0, columns = n > 1 ? n : 0;
+        const low = (i: number): number => a[(f + i) % m], high = (k: number): number => b[(g + k) % n];
+        const sum: bigint[][] = [], fromBelow: boolean[][] = [];
+        for (let i = 0; i <= rows; i++) {
+            sum.push([]);
+            fromBelow.push([]);
+            for (let k = 0; k <= columns; k++) {
+                const below = !k || (i > 0 && sum[i - 1][k] <= sum[i][k - 1]), before = !below ? sum[i][k - 1] : i ? sum[i - 1][k] : 0n;
+                fromBelow[i].push(below);
+                sum[i].push(before + square(this.mesh.vertices[low(i)], this.mesh.vertices[high(k)]));
+            }
+        }
+        for (let i = rows, k = columns; i || k;) {
+            if (fromBelow[i][k]) { this.mesh.triangles.push([low(i - 1), low(i), high(k)]); i--; }
+            else { this.mesh.triangles.push([low(i), high(k), high(k - 1)]); k--; }
+        }
+    }
 }
 
 function stripMesh(map: RadiusImage, turn: number, apex: number[], rows: number[], q: number): Mesh {
@@ -912,7 +1031,7 @@ class Structure {
         const d = new RangeDecoder(payload, record), level = ++this.level;
         if (level === 0 && !(this.flags & EXACT) && d.bit(8192)) {
             const m = new NumberContext(2), number = m.read(d), [width, height] = this.box.size;
-            this.map = number === 5 || number === 6 ? new Tubes(d, number === 6, this.plan, this.box.size) : new SimpleMap(d, m, 6 + number, this.plan, 64 * (width + height));
+            this.map = number >= 5 && number <= 7 ? new Tubes(d, number, this.plan, this.box.size) : new SimpleMap(d, m, 6 + number, this.plan, 64 * (width + height));
         }
         if (this.map) {
             this.map.read(d, level);
