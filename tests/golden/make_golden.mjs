@@ -156,7 +156,7 @@ const blend = (a, b) => Math.max(a, b) + Math.max(5 - Math.abs(a - b), 0) ** 2 /
 const rods = (x, y, ...at) => at.map(([u, v, r]) => r - Math.hypot(x - u, y - v)).reduce(blend);
 const opened = (z) => Math.max(0, z - 25);
 bake('plain_parts', raw('plain_parts', [70, 70, 60], (x, y, z) => Math.min(z - 3, 56 - z,
-    rods(x, y, [35 - opened(z) / 2, 35, 6], [35 + opened(z) / 3, 35 - opened(z) / 2, 6], [35 + opened(z) / 3, 35 + opened(z) / 2, 6]))), '--iso', '0');
+    rods(x, y, [35 + opened(z) / 2, 35, 6], [35 - opened(z) / 3, 35 + opened(z) / 2, 6], [35 - opened(z) / 3, 35 - opened(z) / 2, 6]))), '--iso', '0');
 const merged = (z) => Math.max(0, 30 - z) / 2;
 bake('plain_merges', raw('plain_merges', [60, 46, 60], (x, y, z) => Math.min(z - 3, 56.4 - z, rods(x, y, [30 - merged(z), 23, 7.2], [30 + merged(z), 20, 6.6]))), '--iso', '0');
 bake('plain_plate', raw('plain_plate', [70, 50, 40], (x, y, z) => Math.min(20 - Math.hypot((x - 35) * 0.65, y - 25), z - 4, 36 - z, Math.hypot(x - 24, y - 25) - 5, Math.hypot(x - 46, y - 25) - 4.6)), '--iso', '0');
