@@ -1,5 +1,5 @@
 /* Tubes side by side and within each other, straight, oblique, parting, ending: whatever fits together in every slice makes a closed
- * surface that does not cross itself; what goes on alone is made of strips. */
+ * surface; what goes on alone is made of strips. The overlay's does not cross itself, that of plain tubes not if its joints do not. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -116,10 +116,55 @@ static void known(void) {
     lathe__arena_reset(&arena);
 }
 
+/* Ends are rims: the volume is known but for what is between a slice and half a slice farther. */
+static void plain_known(void) {
+    lathe_radii radii = new_radii(30, 3);
+    radii.plain = true;
+    add_tube(&radii, 0, 30, 64, false, 0, &(shape){40, 60, 0, 0, 20, 1, 0, 0});
+    add_tube(&radii, 8, 12, 32, true, 0, &(shape){42, 58, 0.2, 0, 8, 1, 0, 0});
+    add_tube(&radii, 5, 20, 32, false, 0, &(shape){90, 60, 0, 0.3, 15, 1, 0, 0});
+    lathe_mesh_report r;
+    lathe_mesh mesh = build(&radii, 2);
+    CHECK(is_sound(&mesh, &r));
+    CHECK_EQ(r.components, 3);
+    CHECK_EQ(r.euler, 6);
+    double pi = FULL_TURN / 2, wanted = pi * (20 * 20 * 30 - 8 * 8 * 12 + 15 * 15 * 20);
+    CHECK(fabs(volume(&mesh) - wanted) < 0.02 * wanted);
+    uint32_t rings = 30 * 64 + 12 * 32 + 20 * 32, ends = 2 * (64 + 32 + 32);
+    CHECK_EQ(mesh.vertex_count, rings + ends + 6);
+    CHECK_EQ(mesh.triangle_count, 2 * (29 * 64 + 11 * 32 + 19 * 32) + 3 * ends);
+    CHECK_EQ(lathe__radii_plain(&radii), true);
+    lathe_mesh_free(&mesh);
+    lathe__arena_reset(&arena);
+}
+
+/* A solid that parts into three and becomes two again: the triangles of each joint follow from its rings, and no vertex is added. */
+static void plain_joints(void) {
+    lathe_radii radii = new_radii(30, 3);
+    radii.plain = true;
+    add_tube(&radii, 0, 10, 64, false, 0, &(shape){60, 60, 0, 0, 20, 1, 0, 0});
+    add_tube(&radii, 10, 10, 16, false, 0, &(shape){50, 60, -0.5, 0, 6, 1, 0, 0});
+    add_tube(&radii, 10, 10, 32, false, 0, &(shape){66, 52, 0.2, -0.4, 6, 1, 0, 0});
+    add_tube(&radii, 10, 20, 16, false, 0, &(shape){66, 68, 0.2, 0.4, 6, 1, 0, 0});
+    add_tube(&radii, 20, 10, 32, false, 0, &(shape){57, 54, 0, 0, 8, 2, 0, 0});
+    lathe_mesh_report r;
+    lathe_mesh mesh = build(&radii, 2);
+    CHECK(is_sound(&mesh, &r));
+    CHECK_EQ(r.components, 1);
+    CHECK_EQ(r.euler, 0);      /* the first two of the three meet again */
+    uint32_t rings = 10 * 64 + 10 * 16 + 10 * 32 + 20 * 16 + 10 * 32, ends = 64 + 16 + 32;
+    CHECK_EQ(mesh.vertex_count, rings + ends + 3);
+    uint32_t strips = 2 * (9 * 64 + 9 * 16 + 9 * 32 + 19 * 16 + 9 * 32), joints = (64 + 16 + 32 + 16 + 4) + (16 + 32 + 32 + 2);
+    CHECK_EQ(mesh.triangle_count, strips + joints + 3 * ends);
+    lathe_mesh_free(&mesh);
+    lathe__arena_reset(&arena);
+}
+
 /* A hole that opens at both ends, and one that turns with the column around it. */
-static void pipes(void) {
+static void pipes(bool plain) {
     for (int32_t turn = 0; turn <= 600; turn += 600) {
         lathe_radii radii = new_radii(20, 3);
+        radii.plain = plain;
         add_tube(&radii, 0, 20, 64, false, turn, &(shape){60, 60, 0, 0, 30, 1.5, 0, 0});
         add_tube(&radii, 0, 20, 32, true, turn, &(shape){60, 60, 0, 0, 10, 1.2, 0, 0});
         lathe_mesh_report r;
@@ -171,6 +216,32 @@ static void random_sets(void) {
         lathe__arena_reset(&arena);
     }
     CHECK(made >= 100);
+}
+
+/* Closed whatever they are; what the joints alone say of crossings holds for all of the surface. */
+static void random_plain_sets(void) {
+    int made = 0, crossed = 0;
+    for (int i = 0; i < 2500 && (made < 80 || crossed < 20); i++) {
+        lathe_radii radii = new_radii(whole(3, MOST_ROWS), 3);
+        radii.plain = true;
+        random_tubes(&radii);
+        for (uint32_t level = 0; level < 3; level++) {
+            lathe_mesh mesh = build(&radii, level), joints = {0};
+            lathe_mesh_report r, alone;
+            CHECK(!lathe__mesh_check(&r, &mesh, true));
+            CHECK_EQ(r.boundary_edges, 0);
+            CHECK_EQ(r.bad_indices, 0);
+            if (fits(&radii, level) && CHECK(!lathe__radii_joints(&joints, mesh_arena, &radii, level)) && CHECK(!lathe__mesh_check(&alone, &joints, true))) {
+                CHECK_EQ(!r.self_intersections, !alone.self_intersections);
+                *(alone.self_intersections ? &crossed : &made) += 1;
+            }
+            lathe_mesh_free(&joints);
+            lathe_mesh_free(&mesh);
+        }
+        lathe__arena_reset(&arena);
+    }
+    CHECK(made >= 80);
+    CHECK(crossed >= 20);
 }
 
 /* ---- what a renderer takes ---- */
@@ -237,8 +308,12 @@ static void shading(void) {
 
 int main(void) {
     known();
-    pipes();
+    plain_known();
+    plain_joints();
+    pipes(false);
+    pipes(true);
     random_sets();
+    random_plain_sets();
     shading();
     lathe__arena_free(&arena);
     for (int i = 0; i < 2; i++) lathe__arena_free(&mesh_arena[i]);

@@ -234,6 +234,12 @@ def bake_seconds(lathe, volume, scan, path, *options):
     return median(seconds)
 
 
+def page_decoder(info, wasm):
+    """The decoder that the page of a model carries, beside the whole one"""
+    name = {"whole": "lathe"}.get(info["decoder"], info["decoder"])
+    return os.path.join(os.path.dirname(wasm), name + ".wasm")
+
+
 def measure(name, scan, lathe, wasm, folder, quick):
     volume = os.path.join(DATA, scan["file"])
     archive, other = os.path.join(folder, f"{name}.lathe"), os.path.join(folder, f"{name}-timed.lathe")
@@ -246,7 +252,7 @@ def measure(name, scan, lathe, wasm, folder, quick):
     result["draco"] = len(output([lathe, "export", archive, "--format", "drc", "-o", "-"]))
     # One after the other and twice, so that a busy moment of the machine does not decide.
     speed = [(json.loads(output([lathe, "bench", "decode", archive, "--json"])),
-              json.loads(output(["node", "--single-threaded", os.path.join(HERE, "decode_wasm.mjs"), archive, wasm]))) for _ in range(2)]
+              json.loads(output(["node", "--single-threaded", os.path.join(HERE, "decode_wasm.mjs"), archive, page_decoder(result["info"], wasm)]))) for _ in range(2)]
     result["native"] = min((n for n, _ in speed), key=lambda n: n["seconds"])
     result["native"]["all_levels_seconds"] = min(n["all_levels_seconds"] for n, _ in speed)
     result["wasm"] = {**speed[0][1], **{k: min(w[k] for _, w in speed) for k in ("seconds", "all_levels_seconds")}}
