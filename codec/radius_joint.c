@@ -1,7 +1,7 @@
 /* Plain tubes: where they go on, strips; where they part, merge, begin or end, their rings are joined as they are. Rings of one slice
- * become a single closed chain of vertices [Christiansen and Sederberg 1978], with the shortest bridges; two chains are tiled like any two
+ * become a single closed chain of vertices [Christiansen and Sederberg 1978], with the shortest bridges there are; two chains are tiled like any two
  * contours, by the path that is least in sum [Fuchs, Kedem and Uselton 1977]. Every edge of a ring is in one triangle below and in one
- * above, every bridge in two: the surface is closed. Whether it crosses itself is for the encoder to find out. */
+ * above, every edge of a bridge in two: the surface is closed. Whether it crosses itself is for the encoder to find out. */
 #include <string.h>
 #include "radius_stack.h"
 
@@ -14,26 +14,43 @@ static inline uint64_t apart(places at, uint32_t a, uint32_t b) {
     return x * x + y * y;
 }
 
+static bool comes_once(const chain *c, uint32_t i) {
+    uint32_t times = 0;
+    for (uint32_t k = 0; k < c->count; k++) times += c->vertices[k] == c->vertices[i];
+    return times == 1;
+}
+
+/* Of vertices that their chains come by once: of the others it would not be known when. */
 static void nearest(uint32_t *a, uint32_t *b, places at, const chain *p, const chain *q) {
     uint64_t least = UINT64_MAX;
     for (uint32_t i = 0; i < p->count; i++)
         for (uint32_t k = 0; k < q->count; k++) {
             uint64_t d = apart(at, p->vertices[i], q->vertices[k]);
-            if (d < least) least = d, *a = i, *b = k;
+            if (d < least && comes_once(p, i) && comes_once(q, k)) least = d, *a = i, *b = k;
         }
 }
 
-/* The ring is walked around between two visits of the vertex that is nearest to it. */
-static void add_ring(chain *c, places at, uint32_t first, uint32_t rays) {
+static uint32_t add_vertex(lathe_mesh *mesh, int32_t x, int32_t y, int32_t z) {
+    int32_t *v = mesh->lattice[mesh->vertex_count];
+    v[0] = x, v[1] = y, v[2] = z;
+    return mesh->vertex_count++;
+}
+
+/* The ring is walked around between two visits of the vertex that is nearest to it. The bridge between them has a vertex of its own in the
+ * middle, `rise` off the slice: edges in a slice are edges of rings. */
+static void add_ring(chain *c, lathe_mesh *mesh, uint32_t first, uint32_t rays, int32_t rise) {
     uint32_t ring[LATHE_RADIUS_MAX_RAYS], from = 0, to = 0, *v = c->vertices;
     for (uint32_t i = 0; i < rays; i++) ring[i] = first + i;
     if (c->count) {
-        nearest(&from, &to, at, c, &(chain){ring, rays});
+        nearest(&from, &to, (places)mesh->lattice, c, &(chain){ring, rays});
+        const int32_t *a = mesh->lattice[v[from]], *b = mesh->lattice[ring[to]];
+        uint32_t middle = add_vertex(mesh, (int32_t)(((int64_t)a[0] + b[0]) / 2), (int32_t)(((int64_t)a[1] + b[1]) / 2), a[2] + rise);
         v += from;
-        memmove(v + rays + 2, v, (c->count - from) * sizeof *v);
-        v++;
+        memmove(v + rays + 4, v, (c->count - from) * sizeof *v);
+        v[1] = v[rays + 3] = middle;
+        v += 2;
         v[rays] = ring[to];
-        c->count += 2;
+        c->count += 4;
     }
     for (uint32_t i = 0; i < rays; i++) v[i] = ring[(to + i) % rays];
     c->count += rays;
@@ -100,12 +117,6 @@ static void find_joints(uint8_t *group, const lathe_tube_stack *s, uint32_t slab
 
 /* ---- ends ---- */
 
-static uint32_t add_vertex(lathe_mesh *mesh, int32_t x, int32_t y, int32_t z) {
-    int32_t *v = mesh->lattice[mesh->vertex_count];
-    v[0] = x, v[1] = y, v[2] = z;
-    return mesh->vertex_count++;
-}
-
 /* What nothing follows on ends with its ring once more, as far on as caps rise and an eighth narrower, or wider. */
 static uint32_t add_rim(lathe_mesh *mesh, const lathe_tube_ring *r, uint32_t rays, int side, int32_t rise, bool wider) {
     uint32_t rim = mesh->vertex_count;
@@ -138,7 +149,7 @@ static void add_end(chain chains[2], lathe_tube_stack *s, uint32_t slab, uint32_
         const lathe_tube_ring *ring = lathe__ring_at(s, slab, side, t);
         bool inner = !alone && s->radii->tubes[t].hole;
         uint32_t rim = add_rim(mesh, ring, s->rays[t], side, rise, inner);
-        add_ring(&chains[side != inner], (places)mesh->lattice, rim, s->rays[t]);
+        add_ring(&chains[side != inner], mesh, rim, s->rays[t], 0);
         centre = ring->centre;
     }
     chain *in = &chains[!side];
@@ -149,7 +160,7 @@ static void add_end(chain chains[2], lathe_tube_stack *s, uint32_t slab, uint32_
 /* ---- slabs ---- */
 
 static lathe_status add_joint(lathe_tube_stack *s, uint32_t slab, uint32_t group) {
-    enum { BRIDGES = 2 * LATHE_TUBES_MOST };
+    enum { BRIDGES = 4 * LATHE_TUBES_MOST };
     chain chains[2] = {{0}};
     bool any[2] = {false};
     for (int side = 0; side < 2; side++) {
@@ -161,18 +172,18 @@ static lathe_status add_joint(lathe_tube_stack *s, uint32_t slab, uint32_t group
     for (int side = 0; side < 2 && any[0] == any[1]; side++)
         for (uint32_t t = 0; t < s->radii->count; t++)
             if (group >> t & 1 && lathe__has_ring(s, slab, side, t))
-                add_ring(&chains[side], (places)s->builder.mesh.lattice, lathe__ring_at(s, slab, side, t)->base, s->rays[t]);
+                add_ring(&chains[side], &s->builder.mesh, lathe__ring_at(s, slab, side, t)->base, s->rays[t], (side ? -1 : 1) * LATHE_LATTICE_ONE / 2);
     lathe_status status = join(&s->builder.mesh, s->scratch, &chains[0], &chains[1]);
     lathe__arena_reset(s->scratch);
     return status;
 }
 
 lathe_status lathe__add_plain_slab(lathe_tube_stack *s, uint32_t slab) {
-    enum { BRIDGES = 4 * LATHE_TUBES_MOST };
+    enum { BRIDGES = 8 * LATHE_TUBES_MOST };
     uint8_t group[LATHE_TUBES_MOST];
     lathe_mesh *mesh = &s->builder.mesh;
     /* A tube that ends takes its rim, two triangles for each edge of that, and one for each edge of the rim. */
-    lathe_status status = lathe__builder_reserve(&s->builder, s->most + LATHE_TUBES_MOST, 3 * s->most + BRIDGES);
+    lathe_status status = lathe__builder_reserve(&s->builder, s->most + 2 * LATHE_TUBES_MOST, 3 * s->most + BRIDGES);
     find_joints(group, s, slab);
     for (uint32_t t = 0; !status && t < s->radii->count; t++) {
         if (group[t]) {

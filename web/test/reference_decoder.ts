@@ -925,14 +925,14 @@ class PlainTubes {
 
     private join(members: number[], tubes: (Ring | undefined)[][], over: boolean): void {
         const chains: number[][] = [[], []], at = this.mesh.vertices;
-        if (over) for (const side of [0, 1]) for (const t of members) this.walkAround(chains[side], tubes[t][side]?.vertices ?? []);
+        if (over) for (const side of [0, 1]) for (const t of members) this.walkAround(chains[side], tubes[t][side]?.vertices ?? [], side ? -32768 : 32768);
         else {
             const side = tubes[members[0]][0] ? 0 : 1, alone = members.length === 1, rise = 8192 * this.map.apex[1 - side] * (side ? -1 : 1);
             for (const t of members) {
                 const { vertices, centre, hole } = tubes[t][side] as Ring, inner = !alone && hole;
                 const rim = vertices.map((v) => at.push([...[0, 1].map((k) => at[v][k] + Math.trunc((at[v][k] - centre[k]) / (inner ? 8 : -8))), at[v][2] + rise]) - 1);
                 strip(this.mesh, side ? rim : vertices, side ? vertices : rim);
-                this.walkAround(chains[inner ? 1 - side : side], rim);
+                this.walkAround(chains[inner ? 1 - side : side], rim, 0);
                 if (alone) chains[1 - side].push(at.push([...centre, at[rim[0]][2]]) - 1);
             }
             chains[1 - side].reverse();
@@ -942,17 +942,20 @@ class PlainTubes {
 
     private nearest(p: number[], q: number[]): number[] {
         let least: bigint | null = null, found = [0, 0];
-        p.forEach((a, i) => q.forEach((b, k) => {
+        const once = (list: number[], v: number): boolean => list.indexOf(v) === list.lastIndexOf(v);
+        p.forEach((a, i) => once(p, a) && q.forEach((b, k) => {
+            if (!once(q, b)) return;
             const d = square(this.mesh.vertices[a], this.mesh.vertices[b]);
             if (least === null || d < least) [least, found] = [d, [i, k]];
         }));
         return found;
     }
 
-    private walkAround(chain: number[], ring: number[]): void {
+    private walkAround(chain: number[], ring: number[], rise: number): void {
         if (!chain.length || !ring.length) return void chain.push(...ring);
-        const [i, j] = this.nearest(chain, ring);
-        chain.splice(i + 1, 0, ...ring.slice(j), ...ring.slice(0, j), ring[j], chain[i]);
+        const [i, j] = this.nearest(chain, ring), [p, q] = [this.mesh.vertices[chain[i]], this.mesh.vertices[ring[j]]];
+        const x = this.mesh.vertices.push([...[0, 1].map((k) => Math.trunc((p[k] + q[k]) / 2)), p[2] + rise]) - 1;
+        chain.splice(i + 1, 0, x, ...ring.slice(j), ...ring.slice(0, j), ring[j], x, chain[i]);
     }
 
     private tile(a: number[], b: number[]): void {
