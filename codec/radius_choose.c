@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 #include "mesh.h"
+#include "mesh_intersect.h"
 #include "radius_estimate.h"
 #include "radius_trace.h"
 #include "structure_encode.h"
@@ -477,6 +478,20 @@ static lathe_status joints_fit(bool *good, trial *t, lathe_radii *coded, uint32_
     return status;
 }
 
+/* Of strips that turn, each alone: they meet in rings, which are stars, and caps lie beyond them. */
+static lathe_status strips_fit(bool *good, trial *t, const lathe_mesh *mesh, uint32_t rays, uint32_t strips) {
+    uint32_t(*triangles)[3] = lathe__arena_alloc(&t->arena[1], (size_t)2 * rays, sizeof *triangles);
+    lathe_status status = triangles ? LATHE_OK : LATHE_ERR_MEMORY;
+    for (uint32_t i = 0; !status && *good && i < strips; i++) {
+        uint64_t found = 0;
+        for (uint32_t k = 0; k < 6 * rays; k++) triangles[k / 3][k % 3] = mesh->triangles[(size_t)2 * rays * i + k / 3][k % 3] - rays * i;
+        status = lathe__mesh_intersections(&found, &(lathe_mesh){2 * rays, 2 * rays, mesh->lattice + (size_t)rays * i, triangles});
+        *good = !found;
+    }
+    lathe__arena_reset(&t->arena[1]);
+    return status;
+}
+
 /* The overlay makes a sound surface of whatever outlines fit together, strips of rows that do not turn cannot cross themselves: what has
  * few triangles is checked for its topology, else outlines are. All is checked of level 0, which turns the sharpest corners, and of strips
  * that turn; of plain tubes, which close whatever they are, all that is not known to be sound. */
@@ -491,7 +506,8 @@ static lathe_status check_level(bool *good, trial *t, lathe_radii *coded, uint32
     status = lathe__radii_mesh(&mesh, &t->arena[1], coded, level, &counts, &shown);
     bool few = !level || mesh.triangle_count <= FEW;
     if (!status && coded->plain) *good = (int64_t)mesh.vertex_count - mesh.triangle_count / 2 == t->euler;
-    if (!status && *good && few) *good = sound(&mesh, t->components, t->euler, turned || (tubes && !level));
+    if (!status && *good && few) *good = sound(&mesh, t->components, t->euler, tubes && !level);
+    if (!status && *good && few && turned && !tubes) status = strips_fit(good, t, &mesh, counts.rays, shown - 1);
     lathe_mesh_free(&mesh);
     if (!status && *good && level && coded->plain) status = joints_fit(good, t, coded, level);
     return status;
@@ -555,8 +571,7 @@ static lathe_status follow(lathe_radius_tube *tube, lathe_arena *scratch, const 
 }
 
 /* Of a tube that turns, the rays that turn along, if that takes clearly fewer bytes at one step: their surface must be checked. */
-static lathe_status turn_tube(trial *t, lathe_arena *arena, lathe_arena *scratch, const lathe_traced_tubes *traced, const lathe_grey *grey,
-                              int32_t turn) {
+static lathe_status turn_tube(trial *t, lathe_arena *arena, const lathe_traced_tubes *traced, int32_t turn) {
     lathe_radius_tube *tube = &t->truth.tubes[0];
     lathe_radius_map straight = tube->map;
     uint32_t last = t->truth.level_count - 1;
@@ -564,7 +579,6 @@ static lathe_status turn_tube(trial *t, lathe_arena *arena, lathe_arena *scratch
     set_steps(&t->truth, FINE_STEP, 0, 0);
     lathe_status status = count_bytes(&before, t, last);
     if (!status) status = lathe__radius_turn(&tube->map, arena, traced->tubes[0].loops, turn);
-    if (!status) status = follow(tube, scratch, grey);
     if (!status) status = count_bytes(&bytes, t, last);
     if (!status && bytes + before / 32 >= before) tube->map = straight;
     return status;
@@ -575,8 +589,8 @@ static lathe_status fit_maps(trial *t, lathe_structure_state *state, lathe_arena
     lathe_grey grey = {between_pixels, (void *)(uintptr_t)source, source->iso};
     lathe_status status = fit_tubes(&t->truth, &state->arena, scratch, traced);
     int32_t turn = status || traced->count > 1 ? 0 : estimate_turn(&t->truth.tubes[0].map);
+    if (!status && turn) status = turn_tube(t, &state->arena, traced, turn);
     for (uint32_t i = 0; !status && i < t->truth.count; i++) status = follow(&t->truth.tubes[i], scratch, &grey);
-    if (!status && turn) status = turn_tube(t, &state->arena, scratch, traced, &grey, turn);
     return status ? status : lathe__estimate_start(&t->estimate, &state->arena, &t->truth, slice);
 }
 
