@@ -16,6 +16,7 @@ endif
 CLANG ?= clang
 CLANGXX ?= clang++
 WASM_LD ?= wasm-ld
+WASM_OPT ?= $(shell command -v wasm-opt)
 PARALLEL = $(if $(filter -j% --jobserver%,$(MAKEFLAGS)),,-j$(shell nproc 2>/dev/null || echo 2))
 
 # ---- sources: found by wildcard, but for the decoder that becomes wasm -------------------------------------------------
@@ -121,6 +122,8 @@ WASM_FLAGS = --target=wasm32 -std=c11 $(WASM_OPTIMISE) -flto -mbulk-memory -mnon
               -fno-builtin -nostdlib -DLATHE_SMALL -ffp-contract=off -ffunction-sections -fdata-sections -DNDEBUG -Wall -Wextra -Werror \
               -isystem web/wasm/include -Icore -Icodec -Iweb/wasm -MMD -MP
 WASM_LINK := --no-entry --gc-sections --strip-all --stack-first -z stack-size=262144 -O2 --lto-O1 --compress-relocations -mllvm -disable-lsr
+# Binaryen, where it is installed: 3 to 5 % smaller under brotli, as fast. Low memory is the far end of the stack (--stack-first).
+WASM_OPTIMISER = $(WASM_OPT) --enable-bulk-memory --enable-sign-ext --enable-nontrapping-float-to-int --low-memory-unused --flatten --rereloop -Oz
 WASM_BUILTINS = $(firstword $(shell find -L $$($(CLANG) -print-resource-dir)/lib -name 'libclang_rt.builtins*wasm32*.a' 2>/dev/null))
 
 .PHONY: wasm web
@@ -153,6 +156,7 @@ $(TUBES): $(WASM_SOURCES:%.c=build/wasm/tubes/%.o)
 $(WASM) $(RASTERS) $(TUBES):
 	@echo "  link  $@"
 	$(Q)$(WASM_LD) $(WASM_LINK) -o $@ $^ $(WASM_BUILTINS)
+	$(Q)$(if $(WASM_OPT),$(WASM_OPTIMISER) -o $@ $@,echo "  (no wasm-opt: $@ stays 5 % larger)")
 
 web/node_modules/.package-lock.json: web/package-lock.json
 	@echo "  npm   web"

@@ -67,7 +67,7 @@ enum MHD_Result lathe__handle_models(lathe_request *request) {
 
 static lathe_status build_manifest(lathe_body *body, void *context, lathe_error *err) {
     (void)err;
-    return write_json(body, lathe__manifest(context, false, -1));
+    return write_json(body, lathe__manifest(context));
 }
 
 enum MHD_Result lathe__handle_manifest(lathe_request *request) {

@@ -11,11 +11,28 @@ typedef struct page {
     int64_t structure;
 } page; /* entry NULL: no model */
 
-static lathe_status write_base(lathe_buffer *out, const page *p) {
-    lathe_buffer base = {0};
-    lathe_status status = lathe_model_stream(p->entry->model, p->structure, 0, 0, lathe__buffer_append, &base);
-    if (!status && lathe__buffer_base64(out, base.bytes, base.size)) status = LATHE_ERR_MEMORY;
+/* The stream's beginning, as JSON text in base64; NULL: *status says why. */
+static json_t *base_json(const page *p, lathe_status *status) {
+    lathe_buffer base = {0}, text = {0};
+    *status = lathe_model_stream(p->entry->model, p->structure, 0, 0, lathe__buffer_append, &base);
+    bool coded = !*status && !lathe__buffer_base64(&text, base.bytes, base.size);
+    json_t *json = coded ? json_stringn((const char *)text.bytes, text.size) : NULL;
+    if (!json && !*status) *status = LATHE_ERR_MEMORY;
     lathe__buffer_free(&base);
+    lathe__buffer_free(&text);
+    return json;
+}
+
+/* What the viewer has to know of the model, and its base shape. */
+static lathe_status write_manifest(lathe_buffer *out, const page *p) {
+    lathe_status status;
+    json_t *base = base_json(p, &status), *manifest = base ? lathe__page_manifest(p->entry, p->structure) : NULL;
+    if (!manifest) {
+        json_decref(base);
+        return status ? status : LATHE_ERR_MEMORY;
+    }
+    status = json_object_set_new(manifest, "base", base) ? LATHE_ERR_MEMORY : lathe__json_write(out, manifest);
+    json_decref(manifest);
     return status;
 }
 
@@ -26,16 +43,10 @@ static lathe_status write_decoder(lathe_buffer *out, lathe_small_decoder which) 
 }
 
 static lathe_status write_model(lathe_buffer *out, const page *p) {
-    json_t *manifest = lathe__manifest(p->entry, true, p->structure);
-    lathe_status status = manifest ? LATHE_OK : LATHE_ERR_MEMORY;
-    if (!status && lathe__buffer_text(out, "<script type=\"application/json\" id=\"model\">"))
-        status = LATHE_ERR_MEMORY;
-    if (!status) status = lathe__json_write(out, manifest);
-    json_decref(manifest);
-    if (!status && lathe__buffer_text(out, "</script><script id=\"base\" type=\"text/plain\">"))
-        status = LATHE_ERR_MEMORY;
-    if (!status) status = write_base(out, p);
-    if (!status && lathe__buffer_text(out, "</script><script id=\"wasm\" type=\"text/plain\">")) status = LATHE_ERR_MEMORY;
+    lathe_status status = LATHE_OK;
+    if (lathe__buffer_text(out, "<script type=\"text/plain\" id=\"model\">")) status = LATHE_ERR_MEMORY;
+    if (!status) status = write_manifest(out, p);
+    if (!status && lathe__buffer_text(out, "</script><script type=\"text/plain\" id=\"wasm\">")) status = LATHE_ERR_MEMORY;
     if (!status) status = write_decoder(out, lathe_model_decoder(p->entry->model));
     if (!status && lathe__buffer_text(out, "</script>")) status = LATHE_ERR_MEMORY;
     return status;

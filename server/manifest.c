@@ -46,18 +46,35 @@ static json_t *levels_json(const lathe_level_info *levels, uint32_t count) {
     return list;
 }
 
-static json_t *structure_json(const lathe_structure_info *s, bool inlined) {
+/* As many digits as the viewer shows. */
+static json_t *shown_mm(float value) { return value >= 0 ? rounded(value, 2) : json_null(); }
+
+static json_t *level_errors_json(const lathe_level_info *levels, uint32_t count) {
+    json_t *list = json_array();
+    for (uint32_t n = 0; list && n < count; n++) {
+        json_t *level = json_pack("{s:o, s:o}", "error_max_mm", shown_mm(levels[n].error_max_mm), "error_rms_mm",
+                                  shown_mm(levels[n].error_rms_mm));
+        if (!level || json_array_append_new(list, level)) {
+            json_decref(list);
+            return NULL;
+        }
+    }
+    return list;
+}
+
+/* counted: with the count of levels instead of the levels. */
+static json_t *structure_json(const lathe_structure_info *s, bool counted) {
     char colour[8];
     snprintf(colour, sizeof colour, "#%02x%02x%02x", s->rgb[0], s->rgb[1], s->rgb[2]);
     return json_pack("{s:o, s:s, s:o}", "name", lathe__json_name(s->name), "color", colour, "levels",
-                     inlined ? json_integer(s->level_count) : levels_json(s->levels, s->level_count));
+                     counted ? json_integer(s->level_count) : levels_json(s->levels, s->level_count));
 }
 
-static json_t *structures_json(const lathe_entry *entry, bool inlined, int64_t only) {
+static json_t *structures_json(const lathe_entry *entry, bool counted, int64_t only) {
     json_t *list = json_array();
     for (uint32_t i = 0; list && i < entry->info->structure_count; i++) {
         if (only >= 0 && i != only) continue;
-        json_t *structure = structure_json(&entry->info->structures[i], inlined);
+        json_t *structure = structure_json(&entry->info->structures[i], counted);
         if (!structure || json_array_append_new(list, structure)) {
             json_decref(list);
             return NULL;
@@ -76,22 +93,27 @@ static json_t *bounds_json(lathe_entry *entry, int64_t structure) {
     return json_pack("[o, o]", point_json(low), point_json(high));
 }
 
-json_t *lathe__manifest(lathe_entry *entry, bool inlined, int64_t structure) {
+static json_t *model_name(const lathe_entry *entry) {
+    return lathe__json_name(entry->info->name ? entry->info->name : entry->id);
+}
+
+json_t *lathe__manifest(lathe_entry *entry) {
     const lathe_model_info *info = entry->info;
     const char axis[2] = {(char)('x' + info->axis), 0};
+    return json_pack("{s:s, s:o, s:s, s:s, s:s, s:s, s:o, s:o, s:o, s:o}", "id", entry->id, "name", model_name(entry),
+                     "hash", entry->hash, "axis", axis, "boundary",
+                     info->boundary == LATHE_BOUNDARY_EDGE ? "edge" : "iso", "topology",
+                     info->keep_topology ? "keep" : "own", "iso", rounded(info->iso, 15), "levels",
+                     levels_json(info->levels, lathe__entry_levels(entry, -1)), "bounds", bounds_json(entry, -1),
+                     "structures", structures_json(entry, false, -1));
+}
+
+json_t *lathe__page_manifest(lathe_entry *entry, int64_t structure) {
+    const lathe_model_info *info = entry->info;
     const lathe_level_info *levels = structure < 0 ? info->levels : info->structures[structure].levels;
-    json_t *json = json_pack("{s:s, s:o, s:s, s:s, s:s, s:s, s:o, s:o, s:o, s:o}", "id", entry->id, "name",
-                             lathe__json_name(info->name ? info->name : entry->id), "hash", entry->hash, "axis", axis,
-                             "boundary", info->boundary == LATHE_BOUNDARY_EDGE ? "edge" : "iso", "topology",
-                             info->keep_topology ? "keep" : "own", "iso", rounded(info->iso, 15), "levels",
-                             levels_json(levels, lathe__entry_levels(entry, structure)), "bounds",
-                             bounds_json(entry, structure), "structures", structures_json(entry, inlined, structure));
-    if (json && structure >= 0 &&
-        json_object_set_new(json, "structure", lathe__json_name(info->structures[structure].name))) {
-        json_decref(json);
-        return NULL;
-    }
-    return json;
+    return json_pack("{s:s, s:o, s:o, s:o, s:o}", "id", entry->id, "name", model_name(entry), "levels",
+                     level_errors_json(levels, lathe__entry_levels(entry, structure)), "bounds",
+                     bounds_json(entry, structure), "structures", structures_json(entry, true, structure));
 }
 
 lathe_status lathe__json_write(lathe_buffer *out, json_t *json) {

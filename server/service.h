@@ -195,9 +195,10 @@ enum MHD_Result lathe__handle_slice_contour(lathe_request *request);
 enum MHD_Result lathe__handle_health(lathe_request *request);
 
 /* ---- manifest.c ---- */
-/* The manifest of a model. inlined: as the page carries it, without the structures' levels; structure: only this
- * one, or -1. NULL: out of memory. */
-json_t *lathe__manifest(lathe_entry *entry, bool inlined, int64_t structure);
+/* The manifest of a model. NULL: out of memory. */
+json_t *lathe__manifest(lathe_entry *entry);
+/* What the viewer reads of it, which its page carries; structure: only this one, or -1. */
+json_t *lathe__page_manifest(lathe_entry *entry, int64_t structure);
 json_t *lathe__json_name(const char *text);     /* a string, also of bytes that are not UTF-8 */
 /* Compact, and safe inside a <script>: no '<' in it. */
 lathe_status lathe__json_write(lathe_buffer *out, json_t *json);

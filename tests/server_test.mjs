@@ -386,6 +386,9 @@ test('slices are kept, compressed and refused like everything else', async () =>
     assert.match((await get(`${base}.png?v=${model.hash}`)).headers['cache-control'], /immutable/);
 });
 
+/** The manifest that a page carries, and its decoder's text. */
+const CARRIED = /<script type="text\/plain" id="model">(.*?)<\/script><script type="text\/plain" id="wasm">(.+?)<\/script>/s;
+
 test('the page has manifest and base shape inlined, and nothing in it ends a script early', async () => {
     const { body, headers } = await get(`/m/${several.id}`);
     assert.equal(headers['content-type'], 'text/html; charset=utf-8');
@@ -393,14 +396,19 @@ test('the page has manifest and base shape inlined, and nothing in it ends a scr
     assert.equal(headers['x-content-type-options'], 'nosniff');
     const html = body.toString();
     assert.ok(!html.includes('<!--LATHE_MODEL-->'));
-    const json = /<script type="application\/json" id="model">(.*?)<\/script><script id="base" type="text\/plain">([A-Za-z0-9+/=]*)<\/script>/s.exec(html);
-    const manifest = JSON.parse(json[1]);
+    const json = CARRIED.exec(html), manifest = JSON.parse(json[1]);
     assert.equal(manifest.structures.length, several.structures);
     assert.ok(!json[1].includes('<'));
     for (const structure of manifest.structures) assert.deepEqual(Object.keys(structure).sort(), ['color', 'levels', 'name']);
     assert.ok(Number.isInteger(manifest.structures[0].levels));
-    assert.equal(manifest.hash, several.hash);
-    assert.ok(Buffer.from(json[2], 'base64').equals((await get(`/models/${several.id}/deltas/0.lathe`)).body));
+    const whole = (await get(`/models/${several.id}`)).json();
+    for (const key of ['id', 'name', 'bounds']) assert.deepEqual(manifest[key], whole[key]);
+    assert.equal(manifest.levels.length, whole.levels.length);
+    for (const [i, level] of manifest.levels.entries())
+        for (const key of ['error_rms_mm', 'error_max_mm'])
+            if (whole.levels[i][key] === null) assert.equal(level[key], null);
+            else assert.equal(level[key], +whole.levels[i][key].toPrecision(2));
+    assert.ok(Buffer.from(manifest.base, 'base64').equals((await get(`/models/${several.id}/deltas/0.lathe`)).body));
 });
 
 test('the page of one structure has only that one', async () => {
@@ -408,21 +416,19 @@ test('the page of one structure has only that one', async () => {
     for (const { name } of structures.slice(0, 3)) {
         if (name.includes('?')) continue;
         const html = (await get(`/m/${several.id}?structure=${encodeURIComponent(name)}`)).text;
-        const [, json, base] = /id="model">(.*?)<\/script><script id="base" type="text\/plain">(.*?)<\/script>/s.exec(html);
-        const manifest = JSON.parse(json);
-        assert.equal(manifest.structure, name);
+        const manifest = JSON.parse(CARRIED.exec(html)[1]);
         assert.deepEqual(manifest.structures.map((s) => s.name), [name]);
         for (let axis = 0; axis < 3; axis++)
             assert.ok(manifest.bounds[0][axis] >= bounds[0][axis] && manifest.bounds[1][axis] <= bounds[1][axis]);
         const delta = (await get(`/models/${several.id}/deltas/0.lathe?structure=${encodeURIComponent(name)}`)).body;
-        assert.ok(Buffer.from(base, 'base64').equals(delta));
+        assert.ok(Buffer.from(manifest.base, 'base64').equals(delta));
     }
 });
 
 test('the root is the page without a model; health is told', async () => {
     const root = await get('/');
     assert.equal(root.code, 200);
-    assert.ok(!root.text.includes('id="base"') && !root.text.includes('<!--LATHE_MODEL-->'));
+    assert.ok(!root.text.includes('id="model"') && !root.text.includes('<!--LATHE_MODEL-->'));
     assert.deepEqual((await get('/healthz')).json(), { status: 'ok' });
 });
 

@@ -10,10 +10,13 @@ const wasm = (name) => here(`../build/wasm/${name}.wasm`);
 const [wasmPath = wasm('lathe'), rastersPath = wasm('rasters'), tubesPath = wasm('tubes'), pagePath = here('dist/viewer.html')] = process.argv.slice(2);
 const beside = (name) => pagePath.replace(/[^/]*$/, name);
 
-/** Shaders without comments and needless space; preprocessor lines keep their line ends. */
-const shaders = {
-    name: 'glsl',
+const minifyStyle = async (path) => (await transform(await readFile(path, 'utf8'), { loader: 'css', minify: true })).code.trim();
+
+/** Styles and shaders as text, without comments and needless space; a shader's preprocessor lines keep their line ends. */
+const texts = {
+    name: 'texts',
     setup({ onLoad }) {
+        onLoad({ filter: /\.css$/ }, async ({ path }) => ({ loader: 'text', contents: await minifyStyle(path) }));
         onLoad({ filter: /\.glsl$/ }, async ({ path }) => ({
             loader: 'text',
             contents: (await readFile(path, 'utf8'))
@@ -42,26 +45,25 @@ const bundle = await build({
     entryPoints: [here('src/main.ts')],
     bundle: true,
     minify: true,
-    format: 'iife',
+    format: 'esm',      // but a classic script, as the worker's is: it exports nothing, and a block keeps its names off the window
     target: 'es2022',
     write: false,
     charset: 'utf8',
     legalComments: 'none',
-    plugins: [shaders],
+    plugins: [texts],
     external: ['/extras.js'],
 });
-const script = bundle.outputFiles[0].text.trim();
+const script = `{${bundle.outputFiles[0].text.trim()}}`;
 if (/<\/script|<!--/i.test(script)) throw Error('the script would end its own element');
 
-const style = (await transform(await readFile(here('src/style.css'), 'utf8'), { loader: 'css', minify: true })).code.trim();
-const parts = { STYLE: style, SCRIPT: script };
+const parts = { STYLE: await minifyStyle(here('src/style.css')), SCRIPT: script };
 const template = (await readFile(here('src/page.html'), 'utf8')).replace(/>\s+</g, '><').replace(/\s+/g, ' ').trim();
 const page = template.replace(/\/\*([A-Z]+)\*\//g, (_, part) => parts[part]);
 
 // What is loaded only when somebody asks for more: a module beside the page.
 await build({
     entryPoints: [here('src/extras.ts')], bundle: true, minify: true, format: 'esm', target: 'es2022', charset: 'utf8', legalComments: 'none',
-    outfile: beside('extras.js'),
+    plugins: [texts], outfile: beside('extras.js'),
 });
 
 await mkdir(dirname(pagePath), { recursive: true });

@@ -8,10 +8,10 @@ cd "$(dirname "$0")/../.." || exit 1
 # Compilers and node may come from elsewhere than Debian: they count as present when they can be run.
 tools="gcc g++ ar:binutils clang wasm-ld:lld node:nodejs npm"
 libraries="libc6-dev libmicrohttpd-dev libdraco-dev libjansson-dev libnifti2-dev zlib1g-dev libbrotli-dev"
-wanted=""                                   # what the purpose can do without
+wanted="binaryen"                           # what the purpose can do without
 case $purpose in
 build) ;;
-demo) wanted="mricron-data" ;;
+demo) wanted="$wanted mricron-data" ;;
 test) tools="$tools curl brotli chromium" libraries="$libraries libcgal-dev libgmp-dev libmpfr-dev mricron-data" ;;
 bench) tools="$tools python3" libraries="$libraries mricron-data python3-vtk9 python3-numpy python3-nibabel"
     libraries="$libraries libmeshoptimizer-dev libzstd-dev libcgal-dev libgmp-dev libmpfr-dev" ;;

@@ -1,6 +1,8 @@
-/** What a teacher shows: the smooth surface, a slice with its outline, and edge types in colour. Loaded when it is asked for. */
+/** What a teacher shows: the smooth surface, a slice with its outline, and edge types in colour. Loaded when it is asked for, and
+ * with it all that the first picture of a model does not need. */
 import type { Camera } from './camera';
 import { byId, create, showMessage } from './dom';
+import style from './extras.css';
 import type { Mesh } from './messages';
 import type { Manifest, Vector } from './model';
 
@@ -21,6 +23,12 @@ export interface Extras {
     /** After the surface. */
     paint: (canvas: HTMLCanvasElement) => void;
 }
+
+export { listModels } from './model_list';
+/** This module, as the page gets it. */
+export type Later = typeof import('./extras');
+
+document.head.append(create('style', { textContent: style }));
 
 interface Loop { structure: string; hole: boolean; points: Vector[]; centre?: Vector; edges?: string[] }
 interface Slice { loops: Loop[]; picture: { corner: Vector; right: Vector; down: Vector; width: number; height: number } }

@@ -1,6 +1,6 @@
 /** The meshes that have come: of each structure, by level. */
 import type { Mesh } from './messages';
-import { lastLevel, type StructureInfo } from './model';
+import type { StructureInfo } from './model';
 
 /** Bytes of meshes kept; beyond them earlier levels are thrown away and decoded again when they are asked for. */
 const BUDGET = 4e8;
@@ -53,6 +53,6 @@ export class Levels {
 
     /** The level at which all structures are, or Infinity when they are all at their last. */
     get complete() {
-        return Math.min(...this.#reached.map((reached, i) => (reached < lastLevel(this.structures[i]) ? reached : Infinity)));
+        return Math.min(...this.#reached.map((reached, i) => (reached < this.structures[i].levels - 1 ? reached : Infinity)));
     }
 }

@@ -3,8 +3,6 @@
 export type Vector = [number, number, number];
 
 export interface LevelInfo {
-    vertices: number;
-    triangles: number;
     error_max_mm: number;
     error_rms_mm: number;
 }
@@ -12,16 +10,19 @@ export interface LevelInfo {
 export interface StructureInfo {
     name: string;
     color: string;
-    /** Count of levels, or the levels themselves. */
-    levels: number | unknown[];
+    /** Their count. */
+    levels: number;
 }
 
+/** What the page carries of it. */
 export interface Manifest {
     id: string;
     name: string;
     levels: LevelInfo[];
     bounds: [Vector, Vector];
     structures: StructureInfo[];
+    /** The stream's beginning, in base64. */
+    base: string;
 }
 
 export interface ModelLine {
@@ -31,8 +32,6 @@ export interface ModelLine {
     levels: number;
     bytes: number;
 }
-
-export const lastLevel = ({ levels }: StructureInfo) => (typeof levels === 'number' ? levels : levels.length) - 1;
 
 /** Bytes for people: 1 kB = 1000 bytes. */
 export const formatBytes = (bytes: number) =>

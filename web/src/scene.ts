@@ -25,20 +25,18 @@ export class Scene {
     #gl: WebGL2RenderingContext;
     #program!: WebGLProgram;
     #uploads = new Map<Mesh, Upload>();
-    #events = new AbortController();
 
     /** Throws if there is no WebGL2. redraw is called when the context comes back. */
     constructor(canvas: HTMLCanvasElement, redraw: () => void) {
         const gl = canvas.getContext('webgl2', { powerPreference: 'high-performance' });
         if (!gl) throw Error('no WebGL2');
         this.#gl = gl;
-        const { signal } = this.#events;
-        canvas.addEventListener('webglcontextlost', (event) => event.preventDefault(), { signal });
+        canvas.addEventListener('webglcontextlost', (event) => event.preventDefault());
         canvas.addEventListener('webglcontextrestored', () => {
             this.#uploads.clear();
             this.#build();
             redraw();
-        }, { signal });
+        });
         this.#build();
     }
 
@@ -106,11 +104,5 @@ export class Scene {
             gl.drawElements(gl.TRIANGLES, mesh.triangles * 3, gl.UNSIGNED_INT, 0);
         }
         gl.bindVertexArray(null);
-    }
-
-    dispose() {
-        this.#events.abort();
-        for (const mesh of [...this.#uploads.keys()]) this.drop(mesh);
-        this.#gl.deleteProgram(this.#program);
     }
 }

@@ -8,9 +8,10 @@ import type { Reply, Request } from './messages';
 import { formatBytes, formatCount, type Manifest } from './model';
 import { Scene, type Part } from './scene';
 import { listStructures } from './structures';
-import type { Extras } from './extras';
+import type { Extras, Later } from './extras';
 
-export function runViewer(model: Manifest, script: string) {
+/** later: brings what is not needed for the first picture. */
+export function runViewer(model: Manifest, script: string, later: () => Promise<Later>) {
     const canvas = byId<HTMLCanvasElement>('view'), slider = byId<HTMLInputElement>('level');
     const page = document.documentElement.dataset, last = model.levels.length - 1;
     const structure = new URLSearchParams(location.search).get('structure');
@@ -99,7 +100,7 @@ export function runViewer(model: Manifest, script: string) {
         navigator.clipboard?.writeText(location.href).then(() => ((target as HTMLElement).textContent = 'Link copied'));
     byId('more').onclick = async ({ target }) => {
         (target as HTMLButtonElement).disabled = true;
-        const { open } = await import('/extras.js' as string);
+        const { open } = await later();
         extras = open({ model, camera, redraw, level: () => +(page.level ?? 0), structure });
     };
     attachControls(canvas, camera, save);
@@ -112,7 +113,7 @@ export function runViewer(model: Manifest, script: string) {
         draw();   // at once: setting the size has cleared the picture
     }).observe(canvas);
 
-    const base = bytesOfBase64(byId('base').textContent!);
+    const base = bytesOfBase64(model.base);
     const url = `${location.origin}/models/${encodeURIComponent(model.id)}/stream?from=1`
         + (structure ? '&structure=' + encodeURIComponent(structure) : '');
     ask({ start: { wasm: bytesOfText(byId('wasm').textContent!, WASM_KEY), base, url: last ? url : '' } });

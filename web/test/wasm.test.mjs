@@ -166,7 +166,7 @@ test('the decoder that a page carries reads the model of that page', { skip: !mo
         for (const golden of goldens) {
             const name = golden.slice(0, -'.lathe'.length);
             const html = await (await fetch(`${server.url}/m/${name}`)).text();
-            const text = /<script id="wasm" type="text\/plain">(.*?)<\/script>/s.exec(html)[1];
+            const text = /<script type="text\/plain" id="wasm">(.*?)<\/script>/s.exec(html)[1];
             const module = await WebAssembly.compile(Uint8Array.from(text, (c) => c.charCodeAt(0) ^ key));
             sizes.add(text.length);
             const wasm = await open(module), stream = await (await fetch(`${server.url}/models/${name}/stream`)).arrayBuffer();
