@@ -24,13 +24,9 @@ void lathe__encoder_free(lathe_range_encoder *e);
 typedef struct lathe_range_decoder { const uint8_t *at, *end; uint32_t code, range; uint32_t overrun; } lathe_range_decoder;
 /* Reads zeros beyond the end; overrun counts them: more than 8 means that the packet was truncated or damaged. */
 void lathe__decoder_start(lathe_range_decoder *d, const uint8_t *bytes, size_t size);
-int lathe__decode_bit(lathe_range_decoder *d, uint32_t p1);
-/* The same where bits come by the million; a small decoder has it once. */
-#ifdef LATHE_SMALL
-#define lathe__decode_bit_inline lathe__decode_bit
-#else
 void lathe__decoder_refill(lathe_range_decoder *d);   /* makes range >= 2^24 */
-static inline int lathe__decode_bit_inline(lathe_range_decoder *d, uint32_t p1) {
+/* The bit, and the part of the range that it stands for; a refill must follow. */
+static inline int lathe__decoder_split(lathe_range_decoder *d, uint32_t p1) {
     uint32_t bound = (uint32_t)((uint64_t)d->range * p1 >> 16);
     int bit = d->code < bound;
     if (bit) {
@@ -39,8 +35,17 @@ static inline int lathe__decode_bit_inline(lathe_range_decoder *d, uint32_t p1) 
         d->code -= bound;
         d->range -= bound;
     }
-    if (d->range < 1u << 24) lathe__decoder_refill(d);
     return bit;
 }
+int lathe__decode_bit(lathe_range_decoder *d, uint32_t p1);
+/* The same where bits come by the million; a small decoder has it once. */
+static inline int lathe__decode_bit_inline(lathe_range_decoder *d, uint32_t p1) {
+#ifdef LATHE_SMALL
+    return lathe__decode_bit(d, p1);
+#else
+    int bit = lathe__decoder_split(d, p1);
+    if (d->range < 1u << 24) lathe__decoder_refill(d);
+    return bit;
 #endif
+}
 #endif

@@ -11,21 +11,12 @@ void lathe__decoder_start(lathe_range_decoder *d, const uint8_t *bytes, size_t s
     for (int i = 0; i < 4; i++) d->code = d->code << 8 | next_byte(d);
 }
 
-#ifndef LATHE_SMALL
 void lathe__decoder_refill(lathe_range_decoder *d) {
     for (; d->range < 1u << 24; d->range <<= 8) d->code = d->code << 8 | next_byte(d);
 }
-#endif
 
 int lathe__decode_bit(lathe_range_decoder *d, uint32_t p1) {
-    uint32_t bound = (uint32_t)((uint64_t)d->range * p1 >> 16);
-    int bit = d->code < bound;
-    if (bit) {
-        d->range = bound;
-    } else {
-        d->code -= bound;
-        d->range -= bound;
-    }
-    for (; d->range < 1u << 24; d->range <<= 8) d->code = d->code << 8 | next_byte(d);
+    int bit = lathe__decoder_split(d, p1);
+    lathe__decoder_refill(d);
     return bit;
 }
