@@ -29,13 +29,16 @@ int64_t lathe__turn(const lathe_point *at, uint32_t a, uint32_t b, uint32_t c);
 #else
 #define LATHE_HELPER static inline
 #endif
-/* Twice the area of the triangle at[a] at[b] at[c], positive if it is counter-clockwise. Exact: coordinates are below 2^29. */
-LATHE_HELPER int64_t lathe__turn(const lathe_point *at, uint32_t a, uint32_t b, uint32_t c) {
-    return (int64_t)(at[b].x - at[a].x) * (at[c].y - at[a].y) - (int64_t)(at[b].y - at[a].y) * (at[c].x - at[a].x);
-}
+/* Twice the area of the triangle a b c, positive if it is counter-clockwise. Exact: coordinates are below 2^29. */
 static inline int64_t lathe__orient(lathe_point a, lathe_point b, lathe_point c) {
-    return lathe__turn((const lathe_point[]){a, b, c}, 0, 1, 2);
+    return (int64_t)(b.x - a.x) * (c.y - a.y) - (int64_t)(b.y - a.y) * (c.x - a.x);
 }
+/* The square of a distance. */
+static inline uint64_t lathe__distance2(lathe_point a, lathe_point b) {
+    int64_t x = a.x - b.x, y = a.y - b.y;
+    return (uint64_t)(x * x + y * y);
+}
+LATHE_HELPER int64_t lathe__turn(const lathe_point *at, uint32_t a, uint32_t b, uint32_t c) { return lathe__orient(at[a], at[b], at[c]); }
 
 /* ray.c: directions from an integer table, so that all platforms agree: |direction| is about 2^14. rays: power of two <= 65536. */
 enum { LATHE_RAY_LENGTH = 1 << 14 };

@@ -49,9 +49,9 @@ lathe_status lathe__stack_slab(lathe_mesh_builder *builder, lathe_arena *scratch
                                lathe_overlay_counts *counts) {
     const lathe_outline *upper = slab->outline[1];
     uint32_t below = slab->outline[0]->point_count;
-    for (uint32_t tries = LATHE_RASTERS_ONLY || slab->lattice ? 0 : TRIES;; tries--) {
+    for (uint32_t tries = slab->lattice ? 0 : TRIES;; tries--) {
         slab->crowded = NULL;
-        if (tries && !LATHE_RASTERS_ONLY) {
+        if (tries) {
             slab->crowded = LATHE_NEW(scratch, uint8_t, upper->point_count + 1);
             if (!slab->crowded) return LATHE_ERR_MEMORY;
             memset(slab->crowded, 0, upper->point_count);
@@ -60,7 +60,7 @@ lathe_status lathe__stack_slab(lathe_mesh_builder *builder, lathe_arena *scratch
         for (uint32_t i = 0; tries && i < upper->point_count; i++) {
             int32_t *v = builder->mesh.lattice[vertex ? vertex[below + i] : slab->base + below + i];
             lathe_point *p = &upper->points[i];
-            if (LATHE_RASTERS_ONLY || status != LATHE_ERR_RANGE) v[0] = p->x, v[1] = p->y;
+            if (status != LATHE_ERR_RANGE) v[0] = p->x, v[1] = p->y;
             else if (slab->crowded[i]) *p = lathe__jitter((lathe_point){v[0], v[1]}, tries);
         }
         lathe__arena_reset(scratch);
@@ -131,7 +131,7 @@ lathe_status lathe__level_outlines(lathe_outline **out, lathe_arena arena[2], co
                                  .parity = (int)(i & 1), .fraction = style->fraction};
         uint32_t coarseness = style->coarseness - (style->finer ? style->finer[i] : 0);
         lathe_status status;
-        if (coarseness && !LATHE_RASTERS_ONLY) {
+        if (coarseness) {
             lathe_outline loops;
             status = lathe__trace_outline(&loops, NULL, scratch, &view);
             if (!status) status = lathe__refine_outline(&outlines[i], keep, &loops, coarseness, i);

@@ -65,8 +65,6 @@ typedef struct overlay {
     bool harmed;               /* something is crowded */
 } overlay;
 
-static bool is_lattice(const overlay *o) { return LATHE_RASTERS_ONLY || o->slab->lattice; }
-static uint8_t *crowded_of(const overlay *o) { return LATHE_RASTERS_ONLY ? NULL : o->slab->crowded; }
 static int side_of(const overlay *o, uint32_t vertex) { return vertex >= o->upper; }
 
 /* ---- 1. meetings ---- */
@@ -125,7 +123,7 @@ static int32_t imax(int32_t a, int32_t b) { return a > b ? a : b; }
 
 /* Marks edge b of the upper outline. */
 static void mark_crowded(overlay *o, uint32_t b) {
-    uint8_t *crowded = crowded_of(o) - o->upper;
+    uint8_t *crowded = o->slab->crowded - o->upper;
     crowded[b] = crowded[o->next[b]] = o->harmed = true;
 }
 
@@ -140,7 +138,7 @@ static bool have_room(const overlay *o, uint32_t a, uint32_t b) {
 
 static lathe_status test_edges(overlay *o, uint32_t a, uint32_t b) {
     uint32_t a1 = o->next[a], b1 = o->next[b];
-    if (crowded_of(o) && !have_room(o, a, b)) mark_crowded(o, b);
+    if (o->slab->crowded && !have_room(o, a, b)) mark_crowded(o, b);
     if (a >= o->upper) return LATHE_OK;
     int64_t d1 = lathe__turn(o->at, a, a1, b), d2 = lathe__turn(o->at, a, a1, b1);
     if ((d1 > 0) == (d2 > 0)) return LATHE_OK;
@@ -150,9 +148,8 @@ static lathe_status test_edges(overlay *o, uint32_t a, uint32_t b) {
     return add_meeting(o, a, b, d1, d2, e1, e2);
 }
 
-
-/* Both sides' edges as boxes, for `rows` (whole rows, without horizontal edges) or to find meetings. In a lattice outline an
- * edge lies within one pixel square, which then is its only cell. Where room is looked for, boxes have it around them. */
+/* Both sides' edges as boxes, for `rows` (whole rows, without horizontal edges) or to find meetings. Where room is looked for, boxes have
+ * it around them. */
 static lathe_range *list_ranges(const overlay *o, bool rows) {
     lathe_range *ranges = LATHE_NEW(o->arena, lathe_range, o->vertices);
     for (uint32_t e = 0; ranges && e < o->vertices; e++) {
@@ -160,10 +157,7 @@ static lathe_range *list_ranges(const overlay *o, bool rows) {
         if (rows) {
             r.x0 = r.x1 = 0;
             if (r.y0 == r.y1) r.y1 -= LATHE_LATTICE_ONE;
-        } else if (is_lattice(o)) {
-            r.x1 = imax(r.x1 - 1, r.x0);
-            r.y1 = imax(r.y1 - 1, r.y0);
-        } else if (crowded_of(o)) {
+        } else if (o->slab->crowded) {
             r.x0 -= ROOM, r.y0 -= ROOM, r.x1 += ROOM, r.y1 += ROOM;
         }
         ranges[e] = r;
@@ -207,13 +201,13 @@ static lathe_status find_lattice_meetings(overlay *o) {
 }
 
 static lathe_status find_meetings(overlay *o) {
-    if (is_lattice(o) && !crowded_of(o)) return find_lattice_meetings(o);
-    uint32_t below = crowded_of(o) ? o->vertices : o->upper;   /* what the upper outline is held against */
+    if (o->slab->lattice) return find_lattice_meetings(o);
+    uint32_t below = o->slab->crowded ? o->vertices : o->upper;   /* what the upper outline is held against */
     if (!below || o->upper == o->vertices) return LATHE_OK;
     lathe_grid grid;
     const lathe_range *ranges = list_ranges(o, false);
     if (!ranges) return LATHE_ERR_MEMORY;
-    lathe_status status = lathe__grid_build(&grid, o->arena, ranges, below, is_lattice(o) ? UINT64_MAX : 4 * (uint64_t)below);
+    lathe_status status = lathe__grid_build(&grid, o->arena, ranges, below, 4 * (uint64_t)below);
     if (status) return status;
     for (uint32_t f = o->upper; f < o->vertices; f++) {
         lathe_range b = lathe__cells_of(&ranges[f], grid.shift);
@@ -269,7 +263,7 @@ static lathe_status order_meetings(overlay *o) {
         }
         for (uint32_t i = begin; i < end; i++) {
             o->meetings[o->on[i]].rank[s] = i - begin;
-            if (crowded_of(o) && i > begin) test_spacing(o, o->on[i - 1], o->on[i]);
+            if (o->slab->crowded && i > begin) test_spacing(o, o->on[i - 1], o->on[i]);
         }
     }
     if (!o->harmed) return LATHE_OK;
@@ -322,7 +316,7 @@ static uint32_t nearest_left(const overlay *o, uint32_t vertex, int sides) {
     uint32_t best = NONE;
     lathe_left nearest = LATHE_NOTHING_LEFT;
     int32_t y = at.y >> LATHE_LATTICE_BITS;
-    bool chained = LATHE_RASTERS_ONLY || o->row;
+    bool chained = o->row;
     const uint32_t *first = chained ? NULL : o->rows.first + (y - o->rows.cells.y0);
     for (uint32_t i = chained ? o->row[y - o->row0] : first[0]; chained ? i != NONE : i < first[1]; i = chained ? o->row_chain[i] : i + 1) {
         uint32_t e = chained ? i : o->rows.entry[i];
@@ -355,7 +349,7 @@ static lathe_status chain_rows(overlay *o) {
 }
 
 static lathe_status list_rows(overlay *o) {
-    if (is_lattice(o)) return chain_rows(o);
+    if (o->slab->lattice) return chain_rows(o);
     const lathe_range *ranges = list_ranges(o, true);
     return ranges ? lathe__grid_build(&o->rows, o->arena, ranges, o->vertices, UINT64_MAX) : LATHE_ERR_MEMORY;
 }
@@ -541,15 +535,6 @@ typedef struct strip {
     const float *target;       /* per index of p: the index of q that the trees match it with; NULL: the shorter diagonal decides */
 } strip;
 
-static uint64_t distance2(lathe_point a, lathe_point b) {
-    int64_t x = a.x - b.x, y = a.y - b.y;
-    return (uint64_t)(x * x + y * y);
-}
-
-static int64_t turn(lathe_point a, lathe_point b, lathe_point c) {
-    return (int64_t)(b.x - a.x) * (c.y - a.y) - (int64_t)(b.y - a.y) * (c.x - a.x);
-}
-
 /* Merges two chains by the shorter diagonal; false if some triangle would not be counter-clockwise (nothing is kept then).
  * All counter-clockwise and bounded by the cell's boundary: then they tile the cell. */
 static bool merge_strip(overlay *o, int side, const strip *s, bool open) {
@@ -567,14 +552,14 @@ static bool merge_strip(overlay *o, int side, const strip *s, bool open) {
     lathe_point a = at[*p], b = at[*q];
     while (p < last_p || q < last_q) {
         lathe_point next_a = at[p < last_p ? p[1] : *p], next_b = at[q < last_q ? q[1] : *q];
-        bool can_p = turn(a, next_a, b) > 0, can_q = turn(a, next_b, b) > 0;   /* a chain's end does not turn */
+        bool can_p = lathe__orient(a, next_a, b) > 0, can_q = lathe__orient(a, next_b, b) > 0;   /* a chain's end does not turn */
         if (target && p < last_p && q < last_q) {
             /* Corresponding edges leave the choice of their diagonal; a corresponding vertex waits. */
             float j = (float)(q - s->q);
             if (target[1] <= j) can_q = false;
             else if (target[1] > j + 1 || target[0] >= j + 1) can_p = false;
         }
-        if (can_p && can_q) can_p = distance2(next_a, b) <= distance2(a, next_b);
+        if (can_p && can_q) can_p = lathe__distance2(next_a, b) <= lathe__distance2(a, next_b);
         if (can_p) {
             emit(o, side, *p, p[1], *q);
             p++;
@@ -693,7 +678,7 @@ static bool try_ring_strip(overlay *o, const cycle *outer, const cycle *hole) {
         else least = 0;
     }
     for (uint32_t i = 0; least != 0 && i < hole->count; i++) {
-        uint64_t d = distance2(o->at[p[0]], o->at[q[i]]);
+        uint64_t d = lathe__distance2(o->at[p[0]], o->at[q[i]]);
         if (d < least) { least = d; from = i; }
     }
     strip s;

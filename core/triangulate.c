@@ -31,8 +31,7 @@ typedef struct ring {
 } ring;
 
 static int64_t turn(const ring *r, uint32_t a, uint32_t b, uint32_t c) {
-    lathe_point p = r->place[a].at, q = r->place[b].at, s = r->place[c].at;
-    return (int64_t)(q.x - p.x) * (s.y - p.y) - (int64_t)(q.y - p.y) * (s.x - p.x);
+    return lathe__orient(r->place[a].at, r->place[b].at, r->place[c].at);
 }
 
 /* Does the place see another one through its interior angle? */
@@ -222,15 +221,10 @@ static uint32_t least_bad(const ring *r, uint32_t at, uint32_t left) {
     return choice;
 }
 
-static uint64_t length2(lathe_point a, lathe_point b) {
-    int64_t x = a.x - b.x, y = a.y - b.y;
-    return (uint64_t)(x * x + y * y);
-}
-
 /* The square of an edge's mean length, or about. */
 static uint64_t mean_edge2(const ring *r) {
     uint64_t sum = 0;
-    for (uint32_t i = 0; i < r->rim; i++) sum += length2(r->place[i].at, r->place[r->place[i].end].at) / r->rim;
+    for (uint32_t i = 0; i < r->rim; i++) sum += lathe__distance2(r->place[i].at, r->place[r->place[i].end].at) / r->rim;
     return sum;
 }
 
@@ -246,7 +240,7 @@ static uint32_t clip_ears(ring *r, uint32_t *queue, uint32_t (*triangles)[3]) {
                 queue[tail++] = at;
         while (left > 3 && head < tail) {
             uint32_t at = queue[head++], p = r->place[at].prev, n = r->place[at].next;
-            if (n == NONE || length2(r->place[p].at, r->place[n].at) > limit || !is_convex(r, at) || !is_ear(r, at)) continue;
+            if (n == NONE || lathe__distance2(r->place[p].at, r->place[n].at) > limit || !is_convex(r, at) || !is_ear(r, at)) continue;
             if (p == n) return 0;
             cut(r, at, triangles, count++);
             queue[tail++] = p;
