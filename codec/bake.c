@@ -2,6 +2,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "grey_crossing.h"
 #include "lathe_codec.h"
 #include "mesh.h"
 #include "structure_encode.h"
@@ -50,21 +51,13 @@ static lathe_status extract(bake *b, size_t index, lathe_mask *mask) {
     return lathe__region_label_box(mask, b->volume, o->axis, box, b->err);
 }
 
-static float value_at(const bake *b, const int32_t frame[3], int32_t u, int32_t v, int32_t w) {
-    int32_t at[3];
-    at[frame[0]] = u, at[frame[1]] = v, at[frame[2]] = w;
-    for (int k = 0; k < 3; k++)
-        if (at[k] < 0 || at[k] >= b->volume->dims[k]) return b->volume->min;
-    return b->volume->values[((size_t)at[2] * (size_t)b->volume->dims[1] + (size_t)at[1]) * (size_t)b->volume->dims[0] + (size_t)at[0]];
-}
-
 /* What the encoder asks: positions are of the mask's frame. */
 typedef struct grey_values { bake *bake; const lathe_mask *mask; int32_t frame[3]; } grey_values;
 
 static double grey_value(const void *context, int32_t u, int32_t v, int32_t w) {
     const grey_values *g = context;
     const int32_t *o = g->mask->origin;
-    return (double)value_at(g->bake, g->frame, o[0] + u, o[1] + v, o[2] + w);
+    return (double)lathe__frame_value(g->bake->volume, g->frame, o[0] + u, o[1] + v, o[2] + w);
 }
 
 static void grey_square(const void *context, int32_t u, int32_t v, int32_t w, float out[4]) {
@@ -80,7 +73,7 @@ static void grey_square(const void *context, int32_t u, int32_t v, int32_t w, fl
         out[0] = p[0], out[1] = p[du], out[2] = p[dv], out[3] = p[du + dv];
         return;
     }
-    for (int k = 0; k < 4; k++) out[k] = value_at(g->bake, frame, at[0] + (k & 1), at[1] + (k >> 1), at[2]);
+    for (int k = 0; k < 4; k++) out[k] = lathe__frame_value(volume, frame, at[0] + (k & 1), at[1] + (k >> 1), at[2]);
 }
 
 /* Planning borrows what errors need: where they are wanted, it is a stage of its own. */
@@ -114,48 +107,16 @@ static lathe_encode_source source_of(bake *b, grey_values *grey, const lathe_mas
                                  .context = grey, .iso = b->options->iso};
 }
 
-/* Where the grey values cross iso between neighbouring voxels, on average, within slices or (upright) from slice to slice: one number for
- * the whole structure. Every few slices are enough. */
+/* One number for the whole structure. */
 static int mean_fraction(const bake *b, const lathe_mask *mask, bool upright) {
     if (b->boundary == LATHE_BOUNDARY_EDGE) return LATHE_FRACTION_ONE / 2;
-    int32_t frame[3], every = mask->size[2] / 24 + 1;
-    size_t words = (size_t)mask->row_words, slice_words = lathe__mask_slice_words(mask);
-    lathe__axis_frame(b->options->axis, frame);
-    double sum = 0;
-    size_t count = 0;
-    for (int32_t w = -upright; w < mask->size[2]; w += every) {
-        for (size_t i = 0; i < slice_words; i++) {
-            uint64_t here = w < 0 ? 0 : lathe__mask_slice(mask, w)[i];
-            for (int axis = upright ? 2 : 0; axis < (upright ? 3 : 2); axis++) {
-                int32_t u0 = (int32_t)(i % words) * 64, v = (int32_t)(i / words);
-                uint64_t next = 0;
-                if (axis == 0) next = here >> 1 | (i % words + 1 < words ? lathe__mask_slice(mask, w)[i + 1] << 63 : 0);
-                else if (axis == 1) next = v + 1 < mask->size[1] ? lathe__mask_slice(mask, w)[i + words] : here;
-                else if (w + 1 < mask->size[2]) next = lathe__mask_slice(mask, w + 1)[i];
-                for (uint64_t change = here ^ next; change; change &= change - 1) {
-                    int32_t u = u0 + __builtin_ctzll(change);
-                    const int32_t *o = mask->origin;
-                    float p = value_at(b, frame, o[0] + u, o[1] + v, o[2] + w);
-                    float q = value_at(b, frame, o[0] + u + (axis == 0), o[1] + v + (axis == 1), o[2] + w + (axis == 2));
-                    double inside = p >= q ? p : q, outside = p >= q ? q : p;
-                    if (inside > outside) { sum += (inside - b->options->iso) / (inside - outside); count++; }
-                }
-            }
-        }
-    }
-    int fraction = count ? (int)(sum / (double)count * LATHE_FRACTION_ONE + 0.5) : LATHE_FRACTION_ONE / 2;
-    return fraction < 8 ? 8 : fraction > 56 ? 56 : fraction;
+    return lathe__mean_fraction(mask, b->volume, b->options->axis, b->options->iso, upright);
 }
 
 static size_t sample_count(const bake *b, const lathe_mask *mask) {
     if (b->options->samples) return b->options->samples;
     /* One for about eight border edges: denser where there is more surface, so that sums over structures are area-weighted. */
-    size_t borders = 0;
-    for (int32_t w = 0; w < mask->size[2]; w++) {
-        lathe_slice_view view = {.pixels = lathe__mask_slice(mask, w), .width = mask->size[0], .height = mask->size[1], .row_words = mask->row_words};
-        borders += lathe__count_borders(&view);
-    }
-    size_t n = borders / 8;
+    size_t n = lathe__mask_borders(mask) / 8;
     return n < 400 ? 400 : n > 20000 ? 20000 : n;
 }
 
@@ -276,8 +237,6 @@ static lathe_status plan_pyramid(bake *b) {
     for (size_t i = 0; !status && i < b->count; i++) {
         b->states[i].pyramid = &b->pyramid;
         b->states[i].flags = b->header.parameters[1];
-        b->states[i].upright = mean_fraction(b, &b->states[i].mask, true);
-        if (!b->options->structure_count) b->header.parameters[0] |= (uint32_t)b->states[i].upright << 6;
         b->baked[i].level_count = b->pyramid.level_count;
         b->states[i].plan.slices = b->states[i].mask.size[2];
         b->states[i].plan.level_count = b->pyramid.level_count;
@@ -303,11 +262,16 @@ static lathe_status plan_radii(bake *b) {
         return explain(b, 0, "planning", status);
     }
     state->pyramid = NULL;
-    b->header.parameters[0] = (uint32_t)state->fraction;
     state->flags = b->header.parameters[1] &= ~(uint32_t)(LATHE_FLAG_PYRAMID | LATHE_FLAG_SURE | LATHE_FLAG_CUBES);
     b->header.parameter_count = b->header.parameters[1] ? 2 : 1;
     b->header.structures[0].level_count = (uint8_t)baked->level_count;
     return LATHE_OK;
+}
+
+/* A raster's edges along w have a fraction of their own; that of a threshold is sent. */
+static void set_upright(bake *b) {
+    for (size_t i = 0; i < b->count; i++) b->states[i].upright = mean_fraction(b, &b->states[i].mask, true);
+    if (!b->options->structure_count) b->header.parameters[0] |= (uint32_t)b->states[0].upright << 6;
 }
 
 static lathe_status plan(bake *b) {
@@ -321,6 +285,7 @@ static lathe_status plan(bake *b) {
     }
     if (!status && !slices) status = plan_pyramid(b);
     if (!status && !slices && !o->structure_count && !o->exact && !o->levels) status = plan_radii(b);
+    if (!status && b->states[0].pyramid) set_upright(b);
     return status ? status : tell(b, "planning", 0.2);
 }
 
@@ -335,20 +300,11 @@ static lathe_status encode_structure(bake *b, size_t index, uint32_t level) {
     return explain(b, index, "encoding", status);
 }
 
-/* One structure's part of a pass; its caps behind the last one. */
+/* One structure's part of a pass. */
 static lathe_status encode_pass(bake *b, size_t index, lathe_range_encoder *e, uint32_t level, uint32_t pass) {
     lathe_structure_state *state = &b->states[index];
-    lathe_baked_structure *baked = &b->baked[index];
     lathe_status status = lathe__pass_encode(e, state, &b->models, level, pass);
-    bool last = level + 1 == b->pyramid.level_count && pass + 1 == lathe__pyramid_passes(&b->pyramid, level);
-    if (!status && last && state->flags & LATHE_FLAG_CAPS) {
-        grey_values grey;
-        lathe_encode_source source = source_of(b, &grey, &state->mask);
-        state->stride[0] = state->stride[1] = state->stride[2] = 1;
-        status = lathe__choose_caps(baked, state, b->arena, &source);
-        if (!status) lathe__encode_caps(e, &baked->caps);
-    }
-    if (last) lathe__state_drop_occupancy(state);
+    if (level + 1 == b->pyramid.level_count && pass + 1 == lathe__pyramid_passes(&b->pyramid, level)) lathe__state_drop_occupancy(state);
     return explain(b, index, "encoding", status);
 }
 

@@ -594,15 +594,6 @@ static lathe_status fit_maps(trial *t, lathe_structure_state *state, lathe_arena
     return status ? status : lathe__estimate_start(&t->estimate, &state->arena, &t->truth, slice);
 }
 
-static size_t count_borders(const lathe_mask *mask) {
-    size_t borders = 0;
-    for (int32_t w = 0; w < mask->size[2]; w++) {
-        lathe_slice_view view = {.pixels = lathe__mask_slice(mask, w), .width = mask->size[0], .height = mask->size[1], .row_words = mask->row_words};
-        borders += lathe__count_borders(&view);
-    }
-    return borders;
-}
-
 /* The smoothest shapes' rasters cost a quarter of a bit for each border edge, and their first bytes more. */
 static lathe_status earns_its_place(bool *good, size_t bytes, const trial *t, const lathe_structure_state *state) {
     size_t rasters = t->borders / 30 + 110;
@@ -646,7 +637,7 @@ lathe_status lathe__choose_radii(lathe_baked_structure *out, lathe_structure_sta
     for (int k = 0; k < 3; k++) t.spacing[k] = mm[frame[k]];
     t.pixel = pixel / least;
     t.voxel = least;
-    t.borders = count_borders(&state->mask);
+    t.borders = lathe__mask_borders(&state->mask);
     t.samples = t.borders < 4000 ? 400 : t.borders < 15000 ? t.borders / 10 : 1500;
     lathe_traced_tubes traced;
     lathe_arena loops = {0};

@@ -7,9 +7,11 @@ struct lathe_arena_block {
 };
 enum { ALIGN = 16, HEADER = (sizeof(struct lathe_arena_block) + ALIGN - 1) / ALIGN * ALIGN, FIRST_BLOCK = 1 << 12 };
 
+static size_t aligned(size_t bytes) { return (bytes + ALIGN - 1) & ~(size_t)(ALIGN - 1); }
+
 void *lathe__arena_alloc(lathe_arena *arena, size_t count, size_t size) {
     if (size && count > (SIZE_MAX / 4) / size) return NULL;
-    size_t bytes = (count * size + ALIGN - 1) & ~(size_t)(ALIGN - 1);
+    size_t bytes = aligned(count * size);
     struct lathe_arena_block *top = arena->block;
     if (!top || bytes > top->size - arena->used) {
         size_t want = top ? top->size * 2 : FIRST_BLOCK;
@@ -27,7 +29,7 @@ void *lathe__arena_alloc(lathe_arena *arena, size_t count, size_t size) {
 }
 
 void lathe__arena_shrink(lathe_arena *arena, void *newest, size_t bytes) {
-    arena->used = (size_t)((char *)newest - (char *)arena->block - HEADER) + ((bytes + ALIGN - 1) & ~(size_t)(ALIGN - 1));
+    arena->used = (size_t)((char *)newest - (char *)arena->block - HEADER) + aligned(bytes);
 }
 
 void lathe__arena_reset(lathe_arena *arena) {

@@ -71,15 +71,11 @@ typedef struct rows {
     const uint64_t *row[4];
 } rows; /* (v, w), (v + 1, w), (v, w + 1), (v + 1, w + 1) */
 
-static uint64_t shifted(const uint64_t *row, int32_t k, int32_t words) {
-    return row[k] >> 1 | (k + 1 < words ? row[k + 1] << 63 : 0);
-}
-
 /* Cells 64k .. 64k + 63 of the row whose corners are not all alike. */
 static uint64_t passed(const rows *r, int32_t k, int32_t words) {
     uint64_t any = 0, all = UINT64_MAX;
     for (int i = 0; i < 4; i++) {
-        uint64_t here = r->row[i][k], right = shifted(r->row[i], k, words);
+        uint64_t here = r->row[i][k], right = lathe__row_next(r->row[i], (size_t)k, (size_t)words);
         any |= here | right;
         all &= here & right;
     }

@@ -22,6 +22,10 @@ static inline uint64_t *lathe__mask_slice(const lathe_mask *mask, int32_t w) {
 static inline bool lathe__slice_pixel(const uint64_t *slice, int32_t row_words, int32_t u, int32_t v) {
     return slice[(size_t)v * (size_t)row_words + ((uint32_t)u >> 6)] >> (u & 63) & 1;
 }
+/* Word i of a row whose pixels are each where the one before it was. */
+static inline uint64_t lathe__row_next(const uint64_t *row, size_t i, size_t words) {
+    return row[i] >> 1 | (i + 1 < words ? row[i + 1] << 63 : 0);
+}
 static inline size_t lathe__mask_slice_words(const lathe_mask *mask) {
     return (size_t)mask->size[1] * (size_t)mask->row_words;
 }

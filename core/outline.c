@@ -94,11 +94,19 @@ size_t lathe__count_borders(const lathe_slice_view *view) {
     for (int32_t v = 0; v + 1 < view->height; v++) {
         const uint64_t *row = view->pixels + (size_t)v * words;
         for (size_t i = 0; i < words; i++) {
-            uint64_t next = row[i] >> 1 | (i + 1 < words ? row[i + 1] << 63 : 0);
+            uint64_t next = lathe__row_next(row, i, words);
             count += (size_t)__builtin_popcountll(row[i] ^ next) + (size_t)__builtin_popcountll(row[i] ^ row[i + words]);
         }
     }
     return count;
+}
+
+size_t lathe__mask_borders(const lathe_mask *mask) {
+    size_t borders = 0;
+    for (int32_t w = 0; w < mask->size[2]; w++)
+        borders += lathe__count_borders(&(lathe_slice_view){.pixels = lathe__mask_slice(mask, w), .width = mask->size[0], .height = mask->size[1],
+                                                            .row_words = mask->row_words});
+    return borders;
 }
 
 lathe_status lathe__trace_outline(lathe_outline *out, int32_t **border, lathe_arena *arena, const lathe_slice_view *view) {
@@ -119,7 +127,7 @@ lathe_status lathe__trace_outline(lathe_outline *out, int32_t **border, lathe_ar
     for (int32_t v = 0; v < view->height; v++) {
         const uint64_t *row = view->pixels + (size_t)v * words;
         for (size_t i = 0; i < words; i++) {
-            uint64_t next = row[i] >> 1 | (i + 1 < words ? row[i + 1] << 63 : 0), change;
+            uint64_t next = lathe__row_next(row, i, words), change;
             while ((change = (row[i] ^ next) & ~t.seen[(size_t)v * words + i]) != 0) {
                 int32_t u = (int32_t)(i * 64) + __builtin_ctzll(change);
                 bool left = lathe__slice_pixel(view->pixels, view->row_words, u, v);

@@ -30,4 +30,6 @@ lathe_status lathe__trace_outline(lathe_outline *out, int32_t **border, lathe_ar
 
 /* Number of border edges of a slice, without tracing. */
 size_t lathe__count_borders(const lathe_slice_view *view);
+/* The same of all slices. */
+size_t lathe__mask_borders(const lathe_mask *mask);
 #endif

@@ -44,11 +44,6 @@ static const uint64_t *row_at(const lathe_mask *mask, const uint64_t *air, int32
     return w < 0 || w >= mask->size[2] ? air : lathe__mask_slice(mask, w) + (size_t)v * (size_t)mask->row_words;
 }
 
-/* Word i of a row, moved so that each sample is where the one before it was. */
-static uint64_t shifted(const uint64_t *row, int32_t i, int32_t words) {
-    return row[i] >> 1 | (i + 1 < words ? row[i + 1] << 63 : 0);
-}
-
 /* Vertices on edges within a slice. */
 static lathe_status slice_vertices(surface *s, int32_t w) {
     const lathe_mask *mask = s->mask;
@@ -57,7 +52,7 @@ static lathe_status slice_vertices(surface *s, int32_t w) {
     for (int32_t v = 0; v + 1 < mask->size[1]; v++) {
         const uint64_t *row = lathe__mask_slice(mask, w) + (size_t)v * (size_t)words;
         for (int32_t i = 0; i < words; i++) {
-            uint64_t next = shifted(row, i, words);
+            uint64_t next = lathe__row_next(row, (size_t)i, (size_t)words);
             size_t at = (size_t)v * (size_t)mask->size[0];
             lathe_status status = add_vertices(s, row[i] ^ next, row[i], 0, along_u + at, i * 64, v, w);
             if (!status) status = add_vertices(s, row[i] ^ row[i + words], row[i], 1, along_v + at, i * 64, v, w);
@@ -93,7 +88,7 @@ static lathe_status layer_cubes(surface *s, const uint64_t *air, int32_t w) {
             uint64_t here[4], next[4], any = 0, all = ~(uint64_t)0;
             for (int k = 0; k < 4; k++) {
                 here[k] = row[k][i];
-                next[k] = shifted(row[k], i, words);
+                next[k] = lathe__row_next(row[k], (size_t)i, (size_t)words);
                 any |= here[k] | next[k];
                 all &= here[k] & next[k];
             }

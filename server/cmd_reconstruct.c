@@ -1,6 +1,7 @@
 /* lathe reconstruct: a surface from cross-sections, by the papers' own methods. */
 #include "cli.h"
 #include "contour_json.h"
+#include "grey_crossing.h"
 #include "mesh.h"
 #include "reconstruct.h"
 #include "twist.h"
@@ -48,7 +49,7 @@ static lathe_status slice_volume(lathe_contour_set *set, const reconstruct_job *
                                          : lathe__region_threshold(&mask, volume, axis, iso, err);
     if (status) return status;
     lathe_transform transform = lathe__mask_transform(&mask, axis, volume->affine);
-    int fraction = job->has_label ? LATHE_FRACTION_ONE / 2 : lathe__mean_fraction(&mask, volume, axis, iso);
+    int fraction = job->has_label ? LATHE_FRACTION_ONE / 2 : lathe__mean_fraction(&mask, volume, axis, iso, false);
     status = lathe__contour_set_of_mask(set, &mask, &transform, fraction);
     lathe__mask_free(&mask);
     return status ? lathe_fail(err, status, "the outlines could not be traced: %s", lathe_status_name(status))

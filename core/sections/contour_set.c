@@ -302,36 +302,6 @@ lathe_status lathe__contour_set_build(lathe_contour_set *out, lathe_set_repairs 
 
 /* ---- from a mask ---- */
 
-static double value_at(const lathe_volume *volume, const int32_t frame[3], const int32_t at[3]) {
-    int32_t p[3];
-    for (int k = 0; k < 3; k++) p[frame[k]] = at[k];
-    for (int k = 0; k < 3; k++)
-        if (p[k] < 0 || p[k] >= volume->dims[k]) return volume->min;
-    return volume
-        ->values[((size_t)p[2] * (size_t)volume->dims[1] + (size_t)p[1]) * (size_t)volume->dims[0] + (size_t)p[0]];
-}
-
-int lathe__mean_fraction(const lathe_mask *mask, const lathe_volume *volume, lathe_axis axis, double iso) {
-    int32_t frame[3], every = mask->size[2] / 24 + 1;
-    double sum = 0, count = 0;
-    lathe__axis_frame(axis, frame);
-    for (int32_t w = 0; w < mask->size[2]; w += every)
-        for (int32_t v = 0; v + 1 < mask->size[1]; v++)
-            for (int32_t u = 0; u + 1 < mask->size[0]; u++)
-                for (int d = 0; d < 2; d++) {
-                    const uint64_t *slice = lathe__mask_slice(mask, w);
-                    bool here = lathe__slice_pixel(slice, mask->row_words, u, v);
-                    if (here == lathe__slice_pixel(slice, mask->row_words, u + !d, v + d)) continue;
-                    int32_t at[3] = {mask->origin[0] + u, mask->origin[1] + v, mask->origin[2] + w},
-                            to[3] = {at[0] + !d, at[1] + d, at[2]};
-                    double a = value_at(volume, frame, here ? at : to), b = value_at(volume, frame, here ? to : at);
-                    sum += a > b ? (a - iso) / (a - b) : 0.5;
-                    count++;
-                }
-    int fraction = count > 0 ? (int)(sum / count * LATHE_FRACTION_ONE + 0.5) : LATHE_FRACTION_ONE / 2;
-    return fraction < 8 ? 8 : fraction > 56 ? 56 : fraction;
-}
-
 lathe_status lathe__contour_set_of_mask(lathe_contour_set *out, const lathe_mask *mask,
                                         const lathe_transform *transform, int fraction) {
     lathe_contour_set set = {.count = (uint32_t)mask->size[2], .transform = *transform};

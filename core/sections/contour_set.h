@@ -47,9 +47,6 @@ typedef struct lathe_set_repairs {
 lathe_status lathe__contour_set_build(lathe_contour_set *out, lathe_set_repairs *repairs, const lathe_raw_set *raw,
                                       lathe_error *err);
 
-/* Where the grey values cross iso on border edges of a mask, on average: 0..64 from the inside pixel's centre to the
- * outside one's. */
-int lathe__mean_fraction(const lathe_mask *mask, const lathe_volume *volume, lathe_axis axis, double iso);
 /* The outlines of a mask's slices. fraction: where vertices lie on border edges, 0..64 (LATHE_FRACTION_ONE / 2: the
  * middle). transform: of the mask's lattice. MEMORY, LIMIT. */
 lathe_status lathe__contour_set_of_mask(lathe_contour_set *out, const lathe_mask *mask,
