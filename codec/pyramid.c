@@ -180,14 +180,14 @@ static lathe_status overlaid(lathe_mesh *out, lathe_arena arena[2], const lathe_
 }
 
 lathe_status lathe__pyramid_mesh(lathe_mesh *out, lathe_arena arena[2], const lathe_mask *raster, const int32_t stride[3],
-                                 const int32_t box[3], bool cubes, const lathe_surface_style *style, int upright, lathe_surface_counts *counts) {
+                                 const int32_t box[3], const int fraction[2], const lathe_surface_style *overlay, lathe_surface_counts *counts) {
     if (is_empty(raster)) return octahedron(out, box);
     lathe_status status;
-    if (cubes || LATHE_RASTERS_ONLY) {
-        status = lathe__raster_surface(out, &arena[0], raster, (const int[]){style->fraction, upright});
+    if (!overlay || LATHE_RASTERS_ONLY) {
+        status = lathe__raster_surface(out, &arena[0], raster, fraction);
         counts->rays = (uint32_t)(raster->size[0] + raster->size[1] - 4);
     } else {
-        status = overlaid(out, arena, raster, style, counts);
+        status = overlaid(out, arena, raster, overlay, counts);
     }
     for (uint32_t i = 0; !status && i < out->vertex_count; i++)
         for (int k = 0; k < 3; k++) out->lattice[i][k] *= stride[k];

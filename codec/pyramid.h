@@ -44,8 +44,8 @@ lathe_known lathe__pyramid_known(const lathe_mask *planes, int32_t c, int axis);
 typedef struct lathe_plane_range { int32_t first, step, end; } lathe_plane_range;
 lathe_plane_range lathe__pyramid_planes(const lathe_mask *planes, int axis);
 
-/* The surface of a raster in the frame of its box; of an empty one, the octahedron of the box. style: that of the last level of an
- * overlay of slices; by cubes only its fraction counts, and upright, along w. */
+/* The surface of a raster in the frame of its box; of an empty one, the octahedron of the box. Cube by cube, with fractions within slices
+ * and along w; or, if it is given, in the style of the last level of an overlay of slices. */
 lathe_status lathe__pyramid_mesh(lathe_mesh *out, lathe_arena arena[2], const lathe_mask *raster, const int32_t stride[3],
-                                 const int32_t box[3], bool cubes, const lathe_surface_style *style, int upright, lathe_surface_counts *counts);
+                                 const int32_t box[3], const int fraction[2], const lathe_surface_style *overlay, lathe_surface_counts *counts);
 #endif

@@ -78,14 +78,9 @@ static void want_neighbours(bool *wanted, const lathe_radius_map *map, uint32_t 
     }
 }
 
-static int32_t nothing(void *coder, lathe_number_model *model, int32_t n) {
-    (void)coder, (void)model, (void)n;
-    return 0;
-}
-
 /* As lathe__tube_shown has it, but for the rows that are not shown. */
 static lathe_status show(lathe_radius_map *out, lathe_arena *scratch, lathe_radius_tube *tube, uint32_t passes, const int32_t *slices, uint32_t count) {
-    static const lathe_number_coder PREDICT = {nothing, NULL, NULL};
+    static const lathe_number_coder PREDICT = {0};
     lathe_radius_map map = tube->map;
     *out = map;
     if (!tube->shown || passes >= map.level_count) return LATHE_OK;

@@ -184,10 +184,11 @@ static lathe_status raster_mesh(lathe_mesh *out, lathe_arena arena[2], const lat
                                 lathe_surface_counts *counts, uint32_t *shown) {
     const lathe_mask *raster = state->raster.bits ? &state->raster : &state->mask;
     bool whole = raster == &state->mask;
-    int upright = !whole ? LATHE_FRACTION_ONE / 2 : state->upright ? state->upright : state->fraction;
-    lathe_surface_style style = {.fraction = whole ? state->fraction : LATHE_FRACTION_ONE / 2, .caps = whole ? caps : NULL};
+    int fraction[2] = {LATHE_FRACTION_ONE / 2, LATHE_FRACTION_ONE / 2};
+    if (whole) fraction[0] = state->fraction, fraction[1] = state->upright ? state->upright : state->fraction;
+    lathe_surface_style overlay = {.fraction = fraction[0], .caps = whole ? caps : NULL};
     *shown = (uint32_t)raster->size[2];
-    return lathe__pyramid_mesh(out, arena, raster, state->stride, state->mask.size, state->flags & LATHE_FLAG_CUBES, &style, upright, counts);
+    return lathe__pyramid_mesh(out, arena, raster, state->stride, state->mask.size, fraction, state->flags & LATHE_FLAG_CUBES ? NULL : &overlay, counts);
 }
 
 /* A level of whole slices, or of stars. */

@@ -5,6 +5,7 @@
 #include "check.h"
 #include "level.h"
 #include "mesh.h"
+#include "mesh_volume.h"
 #include "pixel_shapes.h"
 
 static lathe_arena arena;
@@ -41,18 +42,6 @@ static bool closed(const lathe_mesh_report *r) {
            !r->duplicate_positions && !r->unused_vertices && !r->bad_indices;
 }
 
-static double volume_of(const lathe_mesh *mesh) {
-    double six = 0;
-    for (uint32_t t = 0; t < mesh->triangle_count; t++) {
-        double p[3][3];
-        for (int k = 0; k < 3; k++)
-            for (int i = 0; i < 3; i++) p[k][i] = mesh->lattice[mesh->triangles[t][k]][i] / 65536.0;
-        six += p[0][0] * (p[1][1] * p[2][2] - p[1][2] * p[2][1]) - p[0][1] * (p[1][0] * p[2][2] - p[1][2] * p[2][0]) +
-               p[0][2] * (p[1][0] * p[2][1] - p[1][1] * p[2][0]);
-    }
-    return six / 6;
-}
-
 /* What the slab between two outlines must be, and the surface that air below and above closes. */
 typedef struct expected {
     const char *name;
@@ -84,7 +73,7 @@ static double check_stack(const lathe_outline *outlines, uint32_t count, lathe_m
     if (!CHECK(lathe__stack_outlines(&mesh, &arena, outlines, heights, count, false, &counts) == LATHE_OK)) return 0;
     CHECK(lathe__mesh_check(r, &mesh, true) == LATHE_OK);
     if (!(CHECK(closed(r)) & CHECK_EQ(r->self_intersections, 0))) fprintf(stderr, "  in %s\n", name);
-    double volume = volume_of(&mesh);
+    double volume = mesh_volume(&mesh);
     lathe_mesh_free(&mesh);
     return volume;
 }

@@ -4,6 +4,7 @@
 #include "check.h"
 #include "lathe_codec.h"
 #include "mesh.h"
+#include "mesh_volume.h"
 #include "phantom.h"
 #include "restream.h"
 #include "structure_encode.h"
@@ -147,17 +148,6 @@ static bool flawless(const lathe_mesh *mesh, const lathe_topology *topology) {
            r.components == (uint64_t)(topology->components + topology->cavities) && r.euler == 2 * topology->euler;
 }
 
-/* Positive if triangles are counter-clockwise from outside. */
-static double volume_of(const lathe_mesh *mesh) {
-    double sum = 0;
-    for (uint32_t i = 0; i < mesh->triangle_count; i++) {
-        const int32_t *a = mesh->lattice[mesh->triangles[i][0]], *b = mesh->lattice[mesh->triangles[i][1]], *c = mesh->lattice[mesh->triangles[i][2]];
-        sum += (double)a[0] * ((double)b[1] * c[2] - (double)b[2] * c[1]) - (double)a[1] * ((double)b[0] * c[2] - (double)b[2] * c[0]) +
-               (double)a[2] * ((double)b[0] * c[1] - (double)b[1] * c[0]);
-    }
-    return sum;
-}
-
 /* What a decoder has behind a pass is what the whole mask has on that raster, and its surface is right. */
 static void check_pass(const lathe_structure_state *state, const lathe_mask *whole, const lathe_mesh *mesh) {
     const lathe_mask *raster = state->raster.bits ? &state->raster : &state->mask;
@@ -168,7 +158,7 @@ static void check_pass(const lathe_structure_state *state, const lathe_mask *who
     lathe_topology topology = {.components = 0};
     CHECK_EQ(lathe__mask_topology(&topology, &expected, NULL), LATHE_OK);
     if (!topology.components) topology = (lathe_topology){1, 0, 1};   /* the octahedron */
-    CHECK(mesh && flawless(mesh, &topology) && volume_of(mesh) > 0);
+    CHECK(mesh && flawless(mesh, &topology) && mesh_volume(mesh) > 0);
     lathe__mask_free(&expected);
 }
 

@@ -5,6 +5,7 @@
 #include <string.h>
 #include "check.h"
 #include "mesh.h"
+#include "mesh_volume.h"
 #include "mesh_shading.h"
 #include "radius_trace.h"
 
@@ -82,17 +83,6 @@ static bool is_sound(const lathe_mesh *mesh, lathe_mesh_report *r) {
            !r->duplicate_positions && !r->self_intersections && !r->unused_vertices && !r->bad_indices;
 }
 
-/* Six times the volume in voxels. */
-static double volume(const lathe_mesh *m) {
-    double sum = 0, one = LATHE_LATTICE_ONE;
-    for (uint32_t i = 0; i < m->triangle_count; i++) {
-        const int32_t *a = m->lattice[m->triangles[i][0]], *b = m->lattice[m->triangles[i][1]], *c = m->lattice[m->triangles[i][2]];
-        double p[3] = {a[0] / one, a[1] / one, a[2] / one}, q[3] = {b[0] / one, b[1] / one, b[2] / one}, s[3] = {c[0] / one, c[1] / one, c[2] / one};
-        sum += p[0] * (q[1] * s[2] - q[2] * s[1]) + p[1] * (q[2] * s[0] - q[0] * s[2]) + p[2] * (q[0] * s[1] - q[1] * s[0]);
-    }
-    return sum / 6;
-}
-
 /* A closed bottle within a thick column, and a column beside it: topology and volume are known, all but the ends is strips. */
 static void known(void) {
     lathe_radii radii = new_radii(30, 3);
@@ -106,7 +96,7 @@ static void known(void) {
     CHECK_EQ(r.euler, 6);
     /* Caps are about half a slice thick. */
     double pi = FULL_TURN / 2, wanted = pi * (20 * 20 * 30 - 8 * 8 * 12 + 15 * 15 * 20);
-    CHECK(fabs(volume(&mesh) - wanted) < 0.02 * wanted);
+    CHECK(fabs(mesh_volume(&mesh) - wanted) < 0.02 * wanted);
     uint32_t rings = 30 * 64 + 12 * 32 + 20 * 32, strips = 2 * (29 * 64 + 11 * 32 + 19 * 32);
     CHECK(mesh.vertex_count > rings && mesh.vertex_count < rings + 2 * (64 + 32 + 32));
     CHECK(mesh.triangle_count > strips && mesh.triangle_count < strips + 6 * (64 + 32 + 32));
@@ -129,7 +119,7 @@ static void plain_known(void) {
     CHECK_EQ(r.components, 3);
     CHECK_EQ(r.euler, 6);
     double pi = FULL_TURN / 2, wanted = pi * (20 * 20 * 30 - 8 * 8 * 12 + 15 * 15 * 20);
-    CHECK(fabs(volume(&mesh) - wanted) < 0.02 * wanted);
+    CHECK(fabs(mesh_volume(&mesh) - wanted) < 0.02 * wanted);
     uint32_t rings = 30 * 64 + 12 * 32 + 20 * 32, ends = 2 * (64 + 32 + 32);
     CHECK_EQ(mesh.vertex_count, rings + ends + 6);
     CHECK_EQ(mesh.triangle_count, 2 * (29 * 64 + 11 * 32 + 19 * 32) + 3 * ends);
@@ -210,7 +200,7 @@ static void random_sets(void) {
             lathe_mesh mesh = build(&radii, level);
             lathe_mesh_report r;
             CHECK(is_sound(&mesh, &r));
-            CHECK(volume(&mesh) > 0);
+            CHECK(mesh_volume(&mesh) > 0);
             lathe_mesh_free(&mesh);
             made++;
         }

@@ -5,6 +5,7 @@
 #include "check.h"
 #include "cube_table.h"
 #include "mesh.h"
+#include "mesh_volume.h"
 #include "phantom.h"
 #include "raster_surface.h"
 
@@ -81,16 +82,6 @@ static void set(lathe_mask *m, int32_t u, int32_t v, int32_t w) {
     lathe__mask_slice(m, w)[(size_t)v * (size_t)m->row_words + (size_t)(u >> 6)] |= (uint64_t)1 << (u & 63);
 }
 
-static double volume_of(const lathe_mesh *mesh) {
-    double sum = 0;
-    for (uint32_t i = 0; i < mesh->triangle_count; i++) {
-        const int32_t *a = mesh->lattice[mesh->triangles[i][0]], *b = mesh->lattice[mesh->triangles[i][1]], *c = mesh->lattice[mesh->triangles[i][2]];
-        sum += (double)a[0] * ((double)b[1] * c[2] - (double)b[2] * c[1]) - (double)a[1] * ((double)b[0] * c[2] - (double)b[2] * c[0]) +
-               (double)a[2] * ((double)b[0] * c[1] - (double)b[1] * c[0]);
-    }
-    return sum;
-}
-
 /* Every crossing of a line through samples has its vertex, at the fraction from the inside, and there is no other vertex. */
 static bool has_crossings(const lathe_mesh *mesh, const lathe_mask *m, const int fraction[2]) {
     uint64_t expected = 0, found = 0;
@@ -124,7 +115,7 @@ static bool check_raster(const lathe_mask *m, const int fraction[2], const char 
     bool closed = !r.boundary_edges && !r.nonmanifold_edges && !r.misoriented_edges && !r.nonmanifold_vertices && !r.degenerate_triangles &&
                   !r.duplicate_positions && !r.unused_vertices && !r.bad_indices;
     bool right = CHECK(closed) & CHECK_EQ(r.self_intersections, 0) & CHECK_EQ(r.components, topology.components + topology.cavities) &
-                 CHECK_EQ(r.euler, 2 * topology.euler) & CHECK(!topology.components || volume_of(&mesh) > 0) &
+                 CHECK_EQ(r.euler, 2 * topology.euler) & CHECK(!topology.components || mesh_volume(&mesh) > 0) &
                  CHECK(has_crossings(&mesh, m, fraction));
     if (!right) printf("  %s %d, fractions %d %d\n", what, number, fraction[0], fraction[1]);
     lathe_mesh_free(&mesh);
@@ -173,7 +164,7 @@ static void test_ball(void) {
     lathe_arena arena = {0};
     lathe_mesh mesh;
     CHECK_EQ(lathe__raster_surface(&mesh, &arena, &m, (const int[]){32, 32}), LATHE_OK);
-    double volume = volume_of(&mesh) / 6 / LATHE_LATTICE_ONE / LATHE_LATTICE_ONE / LATHE_LATTICE_ONE;
+    double volume = mesh_volume(&mesh);
     CHECK(volume > voxels * 0.97 && volume < voxels * 1.01);
     lathe_mesh_free(&mesh);
     lathe__arena_free(&arena);
