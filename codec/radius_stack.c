@@ -30,7 +30,8 @@ lathe_status lathe__radii_outline(lathe_outline *out, lathe_arena *arena, lathe_
             uint32_t ray = tube->hole ? rays - 1 - k : k;   /* holes have the region on the left, too */
             lathe_point p = lathe__radius_place(&map, c, row, ray * q, r[ray * q]);
             out->ray[out->point_count] = (int32_t)ray;
-            out->points[out->point_count++] = lathe__jitter((lathe_point){p.x & ~1, p.y & ~1}, seed);
+            p.x &= ~1, p.y &= ~1;
+            out->points[out->point_count++] = radii->plain ? p : lathe__jitter(p, seed);
         }
     }
     return LATHE_OK;

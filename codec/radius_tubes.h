@@ -55,7 +55,8 @@ bool lathe__radii_plain(const lathe_radii *radii);
 /* The slices that a level shows, ascending, and the stride of its rays. Arena memory. Not of simple maps. */
 lathe_status lathe__radii_slices(int32_t **out, uint32_t *count, uint32_t *ray_stride, lathe_arena *arena, const lathe_radii *radii,
                                  uint32_t level);
-/* The tubes' polygons in a slice at a level, every stride-th ray of the last level, at least 8 rays. Points get arena memory. */
+/* The tubes' polygons in a slice at a level, every stride-th ray of the last level, at least 8 rays. Points get arena memory; they are
+ * jittered unless the tubes are plain. */
 lathe_status lathe__radii_outline(lathe_outline *out, lathe_arena *arena, lathe_radii *radii, uint32_t level, int32_t slice,
                                   uint32_t stride, uint32_t seed);
 /* radius_mesh.c: directions of a row's rays: a quarter of them, the others are that one turned. turn: what they have been computed for,

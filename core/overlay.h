@@ -43,7 +43,7 @@ typedef struct lathe_slab {
     int32_t cap;                       /* how far a cell of a single outline rises from its slice, lattice units, */
     lathe_caps *caps;                  /* or of its own shape; NULL: cap */
     bool lattice;                      /* every edge lies within one pixel square */
-    uint8_t *crowded;                  /* per vertex of the upper outline, zeroed; NULL: room is not looked for */
+    uint8_t *crowded;                  /* per vertex of the upper outline, zeroed; NULL (always if lattice): room is not looked for */
 } lathe_slab;
 
 /* How the tubes and joints of a slab turned out; sums over slabs. */

@@ -1,7 +1,7 @@
 /* Polygons with holes: holes are bridged, ears clipped, diagonals flipped towards Delaunay. Small ears first: they leave little to
  * flip, and little may lie in their way. What may is a corner that is not convex, found by a grid; cutting an ear changes its two
- * neighbours only, so the time grows about as the number of vertices does; with thousands of holes faster, as each looks at the bridges
- * before it. Exact for simple polygons; it ends also where rounding has folded one. */
+ * neighbours only, so the time grows about as the number of vertices does. Not for thousands of holes, as each looks at the bridges before
+ * it, nor for a comb of thousands of teeth: 1 s for 25,000 of either. Exact for simple polygons; it ends also where rounding has folded one. */
 #include <string.h>
 #include "grid.h"
 #include "overlay.h"
