@@ -39,7 +39,7 @@ static double between_pixels(void *context, double u, double v, int32_t w) {
 
 static double likeness(const lathe_radius_map *map, int32_t apart, int32_t shift) {
     double sum = 0;
-    int32_t every = map->slices / 16 + 1, rows = 0;
+    int32_t every = map->slices / 8 + 1, rows = 0;
     for (int32_t row = 0; row + apart < map->slices; row += every, rows++) {
         const int32_t *a = map->radius + (size_t)row * map->rays, *b = a + (size_t)apart * map->rays;
         double ab = 0, aa = 0, bb = 0, mean_a = 0, mean_b = 0;
@@ -447,11 +447,11 @@ static lathe_status choose_fine_step(trial *t, uint32_t level) {
 
 /* ---- the surfaces ---- */
 
-static bool sound(const lathe_mesh *mesh, int64_t components, int64_t euler, bool intersections) {
+static bool sound(const lathe_mesh *mesh, int64_t components, int64_t euler) {
     lathe_mesh_report r;
-    if (lathe__mesh_check(&r, mesh, intersections)) return false;
+    if (lathe__mesh_check(&r, mesh, false)) return false;
     return !r.boundary_edges && !r.nonmanifold_edges && !r.misoriented_edges && !r.nonmanifold_vertices && !r.degenerate_triangles &&
-           !r.duplicate_positions && !r.self_intersections && (int64_t)r.components == components && r.euler == euler;
+           !r.duplicate_positions && (int64_t)r.components == components && r.euler == euler;
 }
 
 static lathe_status outlines_fit(bool *good, trial *t, lathe_radii *coded, uint32_t level) {
@@ -492,9 +492,8 @@ static lathe_status strips_fit(bool *good, trial *t, const lathe_mesh *mesh, uin
     return status;
 }
 
-/* The overlay makes a sound surface of whatever outlines fit together, strips of rows that do not turn cannot cross themselves: what has
- * few triangles is checked for its topology, else outlines are. All is checked of level 0, which turns the sharpest corners, and of strips
- * that turn; of plain tubes, which close whatever they are, all that is not known to be sound. */
+/* A single tube that does not turn is sound whatever it is. Else what has few triangles is checked for its topology, all of level 0 is;
+ * strips that turn are looked at, and of plain tubes, which close whatever they are, all of which it is not known. */
 static lathe_status check_level(bool *good, trial *t, lathe_radii *coded, uint32_t level) {
     enum { FEW = 3000 };
     lathe_surface_counts counts = {0};
@@ -502,15 +501,13 @@ static lathe_status check_level(bool *good, trial *t, lathe_radii *coded, uint32
     bool turned = coded->tubes[0].map.turn, tubes = coded->count > 1;
     uint32_t shown;
     lathe_status status = tubes ? outlines_fit(good, t, coded, level) : LATHE_OK;
-    if (status || !*good || (level && !tubes && !turned)) return status;
+    if (status || !*good || (!tubes && !turned)) return status;
     status = lathe__radii_mesh(&mesh, &t->arena[1], coded, level, &counts, &shown);
     bool few = !level || mesh.triangle_count <= FEW;
-    if (!status && coded->plain) *good = (int64_t)mesh.vertex_count - mesh.triangle_count / 2 == t->euler;
-    if (!status && *good && few) *good = sound(&mesh, t->components, t->euler, tubes && !level);
-    if (!status && *good && few && turned && !tubes) status = strips_fit(good, t, &mesh, counts.rays, shown - 1);
+    if (!status) *good = (int64_t)mesh.vertex_count - mesh.triangle_count / 2 == t->euler && (!few || sound(&mesh, t->components, t->euler));
+    if (!status && *good && few && turned) status = strips_fit(good, t, &mesh, counts.rays, shown - 1);
     lathe_mesh_free(&mesh);
-    if (!status && *good && level && coded->plain) status = joints_fit(good, t, coded, level);
-    return status;
+    return !status && *good && tubes ? joints_fit(good, t, coded, level) : status;
 }
 
 /* Codes all levels; their bytes. */
@@ -527,16 +524,14 @@ static lathe_status check_levels(size_t *bytes, bool *good, trial *t) {
     return status;
 }
 
-/* Do the tubes go together at the first level and at the last one? Cheaper to know than to find out in the end. */
+/* Do the tubes go together at the first level? Cheaper to know than to find out in the end. */
 static lathe_status try_joints(trial *t) {
     outcome o;
     bool good = true;
-    uint32_t last = t->truth.level_count - 1;
     if (!t->truth.plain) return LATHE_OK;
     set_steps(&t->truth, USUAL_STEP, 0, 0);
-    lathe_status status = try_steps(&o, t, last + 1, last);
-    if (!status) status = check_level(&good, t, &o.coded, last);
-    if (!status && good) status = check_level(&good, t, &o.coded, 0);
+    lathe_status status = try_steps(&o, t, 1, 0);
+    if (!status) status = check_level(&good, t, &o.coded, 0);
     return status ? status : good ? LATHE_OK : LATHE_ERR_EMPTY;
 }
 

@@ -31,11 +31,22 @@ static const int32_t *centre_in(const lathe_tube_stack *s, uint32_t slab, uint32
 /* What a triangle's part of a section spans, as seen from the centre: from (1 - t) A + t C to (1 - t) B + t C, if A and B are neighbours
  * in the lower ring and C is above one of them. It goes on to the left if A x B > 0 and C x (B - A) > 0. Both hold by at least
  * |C| |A| 5.6 / rays, less what moved vertices take away: (2 |C| + |B - A| + 2 MOVE) MOVE; the last is below |C| / 4. */
-static bool can_be_strip(const lathe_tube_stack *s, uint32_t slab, uint32_t tube) {
-    const lathe_tube_ring *a = &s->rings[(int32_t)slab - 1][tube], *b = &s->rings[slab][tube];
-    double least = a->least < b->least ? a->least : b->least, most = a->most > b->most ? a->most : b->most, rays = s->rays[tube];
+static bool can_join(const lathe_tube_ring *a, const lathe_tube_ring *b, double rays) {
+    double least = a->least < b->least ? a->least : b->least, most = a->most > b->most ? a->most : b->most;
     double side = (a->jump > b->jump ? a->jump : b->jump) + most * 7 / rays;   /* |B - A| at most */
-    return a->base != LATHE_NO_RING && b->base != LATHE_NO_RING && !s->map[tube].turn && 5.6 * least * least > (2.25 * least + side) * MOVE * rays;
+    return 5.6 * least * least > (2.25 * least + side) * MOVE * rays;
+}
+
+static bool can_be_strip(const lathe_tube_stack *s, uint32_t slab, uint32_t tube) {
+    const lathe_tube_ring *a = lathe__ring_at(s, slab, 0, tube), *b = lathe__ring_at(s, slab, 1, tube);
+    return a->base != LATHE_NO_RING && b->base != LATHE_NO_RING && !s->map[tube].turn && can_join(a, b, s->rays[tube]);
+}
+
+/* The end of a plain tube, if nothing else is in the joint: a strip to a narrower ring, and a star. */
+static bool can_be_end(const lathe_tube_stack *s, uint32_t slab, uint32_t tube) {
+    int side = lathe__has_ring(s, slab, 1, tube);
+    const lathe_tube_ring *ring = lathe__ring_at(s, slab, side, tube);
+    return s->radii->plain && !lathe__has_ring(s, slab, !side, tube) && can_join(ring, ring, s->rays[tube]);
 }
 
 /* Is there a strip around a tube? */
@@ -74,7 +85,7 @@ void lathe__group_slab(lathe_tube_stack *s, uint32_t slab) {
             lathe__merge_groups(group, n, both);
         }
     for (uint32_t t = 0; t < n; t++)
-        if (group[t] == 1 << t && can_be_strip(s, slab, t)) group[t] = 0;
+        if (group[t] == 1 << t && (can_be_strip(s, slab, t) || can_be_end(s, slab, t))) group[t] = 0;
 }
 
 /* ---- slab by slab, upwards ---- */

@@ -186,6 +186,7 @@ lathe_status lathe__add_plain_slab(lathe_tube_stack *s, uint32_t slab) {
     lathe_status status = lathe__builder_reserve(&s->builder, s->most + 2 * LATHE_TUBES_MOST, 3 * s->most + BRIDGES);
     find_joints(group, s, slab);
     for (uint32_t t = 0; !status && t < s->radii->count; t++) {
+        if (!LATHE_TUBES_ONLY && s->group && !s->group[slab][t]) continue;   /* see lathe__radii_joints */
         if (group[t]) {
             if (!(group[t] & ((1 << t) - 1))) status = add_joint(s, slab, group[t]);
         } else if (lathe__has_ring(s, slab, 0, t)) {

@@ -141,18 +141,6 @@ static lathe_status find_groups(lathe_tube_stack *s) {
     return LATHE_OK;
 }
 
-static bool comes_near(const lathe_tube_stack *s, uint32_t slab) {
-    uint8_t any = 0;
-    for (uint32_t t = 0; t < s->radii->count; t++) any |= s->group[slab][t];
-    return any;
-}
-
-static lathe_status add_slab(lathe_tube_stack *s, uint32_t slab, bool joints) {
-    if (LATHE_TUBES_ONLY || (s->radii->plain && !joints)) return lathe__add_plain_slab(s, slab);
-    if (!s->radii->plain) return lathe__add_group_slab(s, slab);
-    return comes_near(s, slab) ? lathe__add_plain_slab(s, slab) : LATHE_OK;
-}
-
 /* joints: see lathe__radii_joints. */
 static lathe_status stack_tubes(lathe_mesh *out, lathe_arena arena[2], lathe_radii *radii, uint32_t level, const int32_t *slices, uint32_t count,
                                 uint32_t stride, bool joints, lathe_surface_counts *counts) {
@@ -161,7 +149,8 @@ static lathe_status stack_tubes(lathe_mesh *out, lathe_arena arena[2], lathe_rad
     lathe_status status = groups ? find_groups(&s) : LATHE_OK;
     if (!status) status = open_stack(&s, stride, radii, level);
     for (uint32_t i = 0; groups && !status && i <= count; i++) lathe__group_slab(&s, i);
-    for (uint32_t i = 0; !status && i <= count; i++) status = add_slab(&s, i, joints);
+    for (uint32_t i = 0; !status && i <= count; i++)
+        status = LATHE_TUBES_ONLY || radii->plain ? lathe__add_plain_slab(&s, i) : lathe__add_group_slab(&s, i);
     if (status) lathe_mesh_free(&s.builder.mesh);
     else *out = s.builder.mesh;
     return status;

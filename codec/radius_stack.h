@@ -24,7 +24,7 @@ typedef struct lathe_tube_stack {
     lathe_radius_map map[LATHE_TUBES_MOST];
     uint32_t stride[LATHE_TUBES_MOST], rays[LATHE_TUBES_MOST];
     lathe_tube_ring (*rings)[LATHE_TUBES_MOST];   /* by shown slice; before the first and behind the last there are empty ones */
-    uint8_t (*group)[LATHE_TUBES_MOST];        /* by slab: the tubes that come near this one, itself included; 0: a strip apart. NULL: not asked */
+    uint8_t (*group)[LATHE_TUBES_MOST];        /* by slab: the tubes that come near this one, itself included; 0: a strip, or a plain end, apart. NULL: not asked */
     lathe_ray_fan *fans;       /* of each tube */
     lathe_surface_counts *counts;
 } lathe_tube_stack;
@@ -41,7 +41,7 @@ static inline void lathe__merge_groups(uint8_t *group, uint32_t count, uint8_t b
         if (group[k] & both) group[k] = both;
 }
 
-/* radius_joint.c: the triangles of a slab of plain tubes. */
+/* radius_joint.c: the triangles of a slab of plain tubes; with groups, only of those that have one. */
 lathe_status lathe__add_plain_slab(lathe_tube_stack *s, uint32_t slab);
 /* radius_group.c: finds what comes near what; the triangles of a slab whose groups are joined by the overlay. */
 void lathe__group_slab(lathe_tube_stack *s, uint32_t slab);

@@ -48,7 +48,7 @@ lathe_radius_map lathe__tube_shown(lathe_radius_tube *tube, uint32_t passes);
 /* radius_stack.c: the surface at a level that has been coded. arena: two scratch arenas, left reset. */
 lathe_status lathe__radii_mesh(lathe_mesh *out, lathe_arena arena[2], lathe_radii *radii, uint32_t level,
                                lathe_surface_counts *counts, uint32_t *shown);
-/* Of plain tubes, an encoder's: the triangles of all slabs of which it is not known that nothing in them can cross. */
+/* Of plain tubes, an encoder's: slab by slab the triangles of those of which it is not known that nothing can cross them. */
 lathe_status lathe__radii_joints(lathe_mesh *out, lathe_arena arena[2], lathe_radii *radii, uint32_t level);
 /* Can be meshed without the overlay: one tube all along, or plain ones. */
 bool lathe__radii_plain(const lathe_radii *radii);

@@ -51,7 +51,8 @@ int lathe__orient3d(point a, point b, point c, point d) {
 /* Sign of the area of a, b, c in the plane of the axes i and j. */
 static int orient2d(point a, point b, point c, int i, int j) {
     int64_t x = (int64_t)b[i] - a[i], y = (int64_t)b[j] - a[j], z = (int64_t)c[i] - a[i], t = (int64_t)c[j] - a[j];
-    return sign128((int128)x * t - (int128)y * z);
+    uint64_t bits = (uint64_t)(x ^ x >> 63) | (uint64_t)(y ^ y >> 63) | (uint64_t)(z ^ z >> 63) | (uint64_t)(t ^ t >> 63);
+    return bits >> 31 ? sign128((int128)x * t - (int128)y * z) : sign64(x * t - y * z);
 }
 
 bool lathe__triangle_degenerate(point a, point b, point c) {
@@ -141,10 +142,28 @@ static bool sides(int side[3], const point p[3], const point q[3]) {
     return !((side[0] > 0 && side[1] > 0 && side[2] > 0) || (side[0] < 0 && side[1] < 0 && side[2] < 0));
 }
 
-/* No shared corner: two triangles meet just when an edge of one meets the other. */
+/* In one plane: does an edge of p have all of q strictly on its other side? */
+static bool edge_parts(const point p[3], const point q[3], plane in) {
+    int own = orient2d(p[0], p[1], p[2], in.i, in.j);
+    for (int k = 0; k < 3; k++) {
+        const point a = p[k], b = p[k == 2 ? 0 : k + 1];
+        int n = 0;
+        while (n < 3 && orient2d(a, b, q[n], in.i, in.j) * own < 0) n++;
+        if (n == 3) return true;
+    }
+    return false;
+}
+
+static bool coplanar_meet(const point p[3], const point q[3]) {
+    plane in = projection(p[0], p[1], p[2]);
+    return !edge_parts(p, q, in) && !edge_parts(q, p, in);
+}
+
+/* No shared corner: two triangles meet just when an edge of one meets the other, or if they are in one plane and no edge parts them. */
 static bool apart_meet(const point p[3], const point q[3]) {
     int ps[3], qs[3];
     if (!sides(ps, p, q) || !sides(qs, q, p)) return false;
+    if (!ps[0] && !ps[1] && !ps[2]) return coplanar_meet(p, q);
     for (int k = 0; k < 3; k++) {
         int l = k == 2 ? 0 : k + 1;
         if (segment_meets(p[k], p[l], ps[k], ps[l], q) || segment_meets(q[k], q[l], qs[k], qs[l], p)) return true;
