@@ -488,7 +488,7 @@ static void too_many(void) {
 static int32_t wild(void *coder, lathe_number_model *model, int32_t number) {
     int *count = coder;
     (void)model, (void)number;
-    if (!(*count)++) return 5 + (int32_t)(next_random() & 1);   /* tubes; tubes with more in the head */
+    if (!(*count)++) return 5 + (int32_t)(next_random() % 3);   /* tubes; tubes with more in the head; plain ones */
     if (*count < 40) return next_random() % 4 ? 0 : (int32_t)(next_random() % 6) - 1;
     return next_random() % 3 ? 0 : next_random() % 20 ? (int32_t)(next_random() % 41) - 20 : (int32_t)(next_random() % (1 << 20)) - (1 << 19);
 }

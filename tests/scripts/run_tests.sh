@@ -99,7 +99,7 @@ tests_sanitize() {
 }
 
 seed_archives() {                           # small archives, and their streams behind the byte that fuzz_delta takes first
-    local kind size footer
+    local kind
     mkdir -p build/corpus/fuzz_archive build/corpus/fuzz_delta
     [ -x "$LATHE_BIN" ] && [ -x "$LATHE_PHANTOM" ] || return
     for kind in ball labels values keep; do
@@ -109,10 +109,18 @@ seed_archives() {                           # small archives, and their streams 
         [ $kind = keep ] && options="--iso 100 --topology keep"
         # shellcheck disable=SC2086
         "$LATHE_BIN" bake build/corpus/$kind.json $options --quiet -o build/corpus/fuzz_archive/$kind
-        size=$(stat -c %s build/corpus/fuzz_archive/$kind)
-        footer=$(od -An -tu8 -j $((size - 16)) -N 8 build/corpus/fuzz_archive/$kind | tr -d ' ')
-        { printf '\0'; head -c "$footer" build/corpus/fuzz_archive/$kind; } >build/corpus/fuzz_delta/$kind
+        seed_stream $kind
     done
+    for kind in radius tubes plain_hole plain_parts; do
+        cp tests/golden/$kind.lathe build/corpus/fuzz_archive/$kind
+        seed_stream $kind
+    done
+}
+seed_stream() {                             # of an archive: what is before its footer
+    local from=build/corpus/fuzz_archive/$1 size footer
+    size=$(stat -c %s "$from")
+    footer=$(od -An -tu8 -j $((size - 16)) -N 8 "$from" | tr -d ' ')
+    { printf '\0'; head -c "$footer" "$from"; } >build/corpus/fuzz_delta/"$1"
 }
 
 tests_fuzz() {
