@@ -83,12 +83,16 @@ static bool is_sound(const lathe_mesh *mesh, lathe_mesh_report *r) {
            !r->duplicate_positions && !r->self_intersections && !r->unused_vertices && !r->bad_indices;
 }
 
+enum { BOTTLE_RINGS = 30 * 64 + 12 * 32 + 20 * 32, BOTTLE_STRIPS = 2 * (29 * 64 + 11 * 32 + 19 * 32), BOTTLE_ENDS = 2 * (64 + 32 + 32) };
+
 /* A closed bottle within a thick column, and a column beside it: topology and volume are known, all but the ends is strips. */
-static void known(void) {
+static lathe_mesh bottle(bool plain) {
     lathe_radii radii = new_radii(30, 3);
+    radii.plain = plain;
     add_tube(&radii, 0, 30, 64, false, 0, &(shape){40, 60, 0, 0, 20, 1, 0, 0});
     add_tube(&radii, 8, 12, 32, true, 0, &(shape){42, 58, 0.2, 0, 8, 1, 0, 0});
     add_tube(&radii, 5, 20, 32, false, 0, &(shape){90, 60, 0, 0.3, 15, 1, 0, 0});
+    CHECK_EQ(lathe__radii_plain(&radii), plain);
     lathe_mesh_report r;
     lathe_mesh mesh = build(&radii, 2);
     CHECK(is_sound(&mesh, &r));
@@ -97,33 +101,24 @@ static void known(void) {
     /* Caps are about half a slice thick. */
     double pi = FULL_TURN / 2, wanted = pi * (20 * 20 * 30 - 8 * 8 * 12 + 15 * 15 * 20);
     CHECK(fabs(mesh_volume(&mesh) - wanted) < 0.02 * wanted);
-    uint32_t rings = 30 * 64 + 12 * 32 + 20 * 32, strips = 2 * (29 * 64 + 11 * 32 + 19 * 32);
-    CHECK(mesh.vertex_count > rings && mesh.vertex_count < rings + 2 * (64 + 32 + 32));
-    CHECK(mesh.triangle_count > strips && mesh.triangle_count < strips + 6 * (64 + 32 + 32));
+    return mesh;
+}
+
+static void known(void) {
+    lathe_mesh mesh = bottle(false);
+    CHECK(mesh.vertex_count > BOTTLE_RINGS && mesh.vertex_count < BOTTLE_RINGS + BOTTLE_ENDS);
+    CHECK(mesh.triangle_count > BOTTLE_STRIPS && mesh.triangle_count < BOTTLE_STRIPS + 3 * BOTTLE_ENDS);
     /* Rays go straight up, where the overlay's jitter is not: the middle of the column. */
     for (uint32_t i = 0; i < 64; i++) CHECK(mesh.lattice[2 * 64 + i][0] == mesh.lattice[3 * 64 + i][0]);
     lathe_mesh_free(&mesh);
     lathe__arena_reset(&arena);
 }
 
-/* Ends are rims: the volume is known but for what is between a slice and half a slice farther. */
+/* Each end has a rim and one vertex more. */
 static void plain_known(void) {
-    lathe_radii radii = new_radii(30, 3);
-    radii.plain = true;
-    add_tube(&radii, 0, 30, 64, false, 0, &(shape){40, 60, 0, 0, 20, 1, 0, 0});
-    add_tube(&radii, 8, 12, 32, true, 0, &(shape){42, 58, 0.2, 0, 8, 1, 0, 0});
-    add_tube(&radii, 5, 20, 32, false, 0, &(shape){90, 60, 0, 0.3, 15, 1, 0, 0});
-    lathe_mesh_report r;
-    lathe_mesh mesh = build(&radii, 2);
-    CHECK(is_sound(&mesh, &r));
-    CHECK_EQ(r.components, 3);
-    CHECK_EQ(r.euler, 6);
-    double pi = FULL_TURN / 2, wanted = pi * (20 * 20 * 30 - 8 * 8 * 12 + 15 * 15 * 20);
-    CHECK(fabs(mesh_volume(&mesh) - wanted) < 0.02 * wanted);
-    uint32_t rings = 30 * 64 + 12 * 32 + 20 * 32, ends = 2 * (64 + 32 + 32);
-    CHECK_EQ(mesh.vertex_count, rings + ends + 6);
-    CHECK_EQ(mesh.triangle_count, 2 * (29 * 64 + 11 * 32 + 19 * 32) + 3 * ends);
-    CHECK_EQ(lathe__radii_plain(&radii), true);
+    lathe_mesh mesh = bottle(true);
+    CHECK_EQ(mesh.vertex_count, BOTTLE_RINGS + BOTTLE_ENDS + 6);
+    CHECK_EQ(mesh.triangle_count, BOTTLE_STRIPS + 3 * BOTTLE_ENDS);
     lathe_mesh_free(&mesh);
     lathe__arena_reset(&arena);
 }
