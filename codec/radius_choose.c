@@ -348,8 +348,8 @@ static void set_ahead(lathe_radii *truth, uint32_t ahead) {
     for (uint32_t i = 0; i < truth->count; i++) truth->tubes[i].map.ahead = ahead;
 }
 
-/* What a level costs that is about close, at a step that is usual for it; it need not be known if it is clearly more than least. */
-static lathe_status try_ahead(double *cost, trial *t, uint32_t ahead, double least) {
+/* What a level costs that is about close, at a step that may be usual for it; it need not be known if it is clearly more than least. */
+static lathe_status try_ahead(double *cost, trial *t, uint32_t ahead, int32_t step, double least) {
     enum { RECORD = 21 };
     static const double NEARLY = 1.3, CLEARLY_MORE = 1.1;
     lathe_radii coded = frame_of(t);
@@ -358,7 +358,7 @@ static lathe_status try_ahead(double *cost, trial *t, uint32_t ahead, double lea
     lathe_status status = LATHE_OK;
     *cost = INFINITY;
     set_ahead(&t->truth, ahead);
-    set_steps(&t->truth, USUAL_STEP, 0, 0);
+    set_steps(&t->truth, step, 0, 0);
     lathe__arena_reset(&t->arena[0]);
     for (uint32_t level = 0; level < t->truth.level_count && rms > CLOSE_RMS; level++) {
         status = add_bytes(&sum, &coded, t, level);
@@ -373,18 +373,21 @@ static lathe_status try_ahead(double *cost, trial *t, uint32_t ahead, double lea
     return status;
 }
 
-/* Rays as dense as slices, denser, or all of them before any slice between the ends: what twists or is the same all along. */
+/* Rays as dense as slices, denser, or all of them before any slice between the ends: what twists or is the same all along. By the step that
+ * is usual, or by a fine one if that brings no level near. */
 static lathe_status choose_ahead(trial *t) {
-    static const uint32_t AHEAD[] = {0, LATHE_RADIUS_MOST_AHEAD, 1};
+    static const uint32_t OTHERS[] = {LATHE_RADIUS_MOST_AHEAD, 1};
     static const double CLEARLY = 0.96;
     enum { EVERY = 5 };
-    lathe_status status = LATHE_OK;
-    double least = INFINITY, cost;
+    double least, cost;
     uint32_t best = 0;
+    int32_t step = USUAL_STEP;
     t->estimate.every = EVERY;
-    for (size_t i = 0; !status && i < sizeof AHEAD / sizeof *AHEAD; i++) {
-        status = try_ahead(&cost, t, AHEAD[i], least);
-        if (cost < CLEARLY * least) least = cost, best = AHEAD[i];
+    lathe_status status = try_ahead(&least, t, 0, step, INFINITY);
+    if (!status && least >= INFINITY) status = try_ahead(&least, t, 0, step = FINE_STEP, INFINITY);
+    for (size_t i = 0; !status && i < sizeof OTHERS / sizeof *OTHERS; i++) {
+        status = try_ahead(&cost, t, OTHERS[i], step, least);
+        if (cost < CLEARLY * least) least = cost, best = OTHERS[i];
     }
     t->estimate.every = 1;
     set_ahead(&t->truth, best);

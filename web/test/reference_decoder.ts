@@ -870,7 +870,7 @@ function strip(mesh: Mesh, lower: number[], upper: number[]): void {
     }
 }
 
-interface Ring { tube: number; hole: boolean; centre: number[]; most: number; vertices: number[] }
+interface Ring { tube: number; hole: boolean; centre: number[]; vertices: number[] }
 
 class PlainTubes {
     readonly mesh: Mesh = { vertices: [], triangles: [] };
@@ -889,25 +889,20 @@ class PlainTubes {
 
     private ring(tube: Tube, index: number, image: RadiusImage, row: number, w: number, q: number): Ring {
         const centre = image.centres[row].map((c) => c * 32768), vertices: number[] = [];
-        let most = 0;
         for (let k = 0; k < tube.rays; k += q) {
             const i = tube.hole ? tube.rays - q - k : k, turned = (((i * (65536 / tube.rays) + this.map.turn * row) % 65536) + 65536) % 65536;
             const d = direction(turned, 65536);
-            most = Math.max(most, image.radii[row][i]);
             vertices.push(this.mesh.vertices.length);
             this.mesh.vertices.push([...[0, 1].map((c) => 2 * Math.floor((centre[c] + Math.trunc((image.radii[row][i] * 1024 * d[c]) / 16384)) / 2)), w * 65536]);
         }
-        return { tube: index, hole: tube.hole, centre, most: most * 1025, vertices };
+        return { tube: index, hole: tube.hole, centre, vertices };
     }
 
     private slab(i: number): void {
         const sides = [this.rings[i - 1] ?? [], this.rings[i] ?? []], tubes = this.map.tubes.map((_, t) => sides.map((rings) => rings.find((r) => r.tube === t)));
         const single = tubes.flatMap(([a, b], t) => (!a === !b ? [] : [t])), joint = new Map(single.map((t) => [t, [t]])), over = new Set<number>();
         const ringOf = (t: number): Ring => (tubes[t][0] ?? tubes[t][1]) as Ring;
-        const areOver = (t: number, u: number): boolean => {
-            const [p, q] = [ringOf(t), ringOf(u)], x = p.centre[0] - q.centre[0], y = p.centre[1] - q.centre[1], most = Math.max(p.most, q.most);
-            return x * x + y * y < most * most;
-        };
+        const areOver = (t: number, u: number): boolean => this.encloses(ringOf(t), ringOf(u)) || this.encloses(ringOf(u), ringOf(t));
         const merge = (t: number, u: number): void => {
             const all = [...new Set([...(joint.get(t) as number[]), ...(joint.get(u) as number[])])].sort((a, b) => a - b);
             for (const k of all) joint.set(k, all);
@@ -923,16 +918,35 @@ class PlainTubes {
         });
     }
 
+    /** Is a vertex of the other one inside? */
+    private encloses(ring: Ring, other: Ring): boolean {
+        const at = this.mesh.vertices, n = ring.vertices.length;
+        return other.vertices.some((v) => {
+            let odd = false;
+            ring.vertices.forEach((a, i) => {
+                const p = at[a], q = at[ring.vertices[(i + 1) % n]], c = at[v];
+                if (p[1] > c[1] === q[1] > c[1]) return;
+                const turn = BigInt(q[0] - p[0]) * BigInt(c[1] - p[1]) - BigInt(q[1] - p[1]) * BigInt(c[0] - p[0]);
+                if (turn > 0n === q[1] > p[1]) odd = !odd;
+            });
+            return odd;
+        });
+    }
+
     private join(members: number[], tubes: (Ring | undefined)[][], over: boolean): void {
         const chains: number[][] = [[], []], at = this.mesh.vertices;
-        if (over) for (const side of [0, 1]) for (const t of members) this.walkAround(chains[side], tubes[t][side]?.vertices ?? [], side ? -32768 : 32768);
-        else {
+        if (over) {
+            for (const side of [0, 1]) for (const t of members) {
+                const ring = tubes[t][side];
+                if (ring) this.addRing(chains[side], ring.vertices, side, side ? -32768 : 32768);
+            }
+        } else {
             const side = tubes[members[0]][0] ? 0 : 1, alone = members.length === 1, rise = 8192 * this.map.apex[1 - side] * (side ? -1 : 1);
             for (const t of members) {
                 const { vertices, centre, hole } = tubes[t][side] as Ring, inner = !alone && hole;
                 const rim = vertices.map((v) => at.push([...[0, 1].map((k) => at[v][k] + Math.trunc((at[v][k] - centre[k]) / (inner ? 8 : -8))), at[v][2] + rise]) - 1);
                 strip(this.mesh, side ? rim : vertices, side ? vertices : rim);
-                this.walkAround(chains[inner ? 1 - side : side], rim, 0);
+                this.addRing(chains[inner ? 1 - side : side], rim, side, 0);
                 if (alone) chains[1 - side].push(at.push([...centre, at[rim[0]][2]]) - 1);
             }
             chains[1 - side].reverse();
@@ -940,26 +954,44 @@ class PlainTubes {
         this.tile(chains[0], chains[1]);
     }
 
-    private nearest(p: number[], q: number[]): number[] {
-        let least: bigint | null = null, found = [0, 0];
-        const once = (list: number[], v: number): boolean => list.indexOf(v) === list.lastIndexOf(v);
-        p.forEach((a, i) => once(p, a) && q.forEach((b, k) => {
-            if (!once(q, b)) return;
-            const d = square(this.mesh.vertices[a], this.mesh.vertices[b]);
-            if (least === null || d < least) [least, found] = [d, [i, k]];
-        }));
-        return found;
+    /** By a bridge, if it is not the first. */
+    private addRing(chain: number[], ring: number[], side: number, rise: number): void {
+        if (!chain.length) return void chain.push(...ring);
+        const at = this.mesh.vertices, n = ring.length, slice = at[ring[0]][2];
+        let least: bigint | null = null, i = 0, k = 0;
+        chain.forEach((a, c) => {
+            const p = at[a], q = at[chain[(c + 1) % chain.length]];
+            if (p[2] !== slice || q[2] !== slice) return;
+            ring.forEach((b, r) => {
+                const d = square(p, at[ring[(r + 1) % n]]) + square(q, at[b]);
+                if (least === null || d < least) [least, i, k] = [d, c, r];
+            });
+        });
+        const [a, b, p, q] = [chain[i], chain[(i + 1) % chain.length], ring[k], ring[(k + 1) % n]];
+        const middle = (v: number, w: number): number => at.push([...[0, 1].map((x) => Math.trunc((at[v][x] + at[w][x]) / 2)), at[v][2] + rise]) - 1;
+        const enter = middle(a, q), leave = middle(b, p);
+        for (const [x, y, z] of [[a, b, leave], [a, leave, enter], [enter, leave, p], [enter, p, q]]) this.mesh.triangles.push(side ? [x, z, y] : [x, y, z]);
+        chain.splice(i + 1, 0, enter, ...ring.slice(k + 1), ...ring.slice(0, k + 1), leave);
     }
 
-    private walkAround(chain: number[], ring: number[], rise: number): void {
-        if (!chain.length || !ring.length) return void chain.push(...ring);
-        const [i, j] = this.nearest(chain, ring), [p, q] = [this.mesh.vertices[chain[i]], this.mesh.vertices[ring[j]]];
-        const x = this.mesh.vertices.push([...[0, 1].map((k) => Math.trunc((p[k] + q[k]) / 2)), p[2] + rise]) - 1;
-        chain.splice(i + 1, 0, x, ...ring.slice(j), ...ring.slice(0, j), ring[j], x, chain[i]);
+    private nearest(chain: number[], to: number): number {
+        const at = this.mesh.vertices, distances = chain.map((v) => square(at[v], at[to]));
+        return distances.indexOf(distances.reduce((x, y) => (y < x ? y : x)));
+    }
+
+    private start(lower: number[], upper: number[]): number[] {
+        const at = this.mesh.vertices, mean = [0, 1].map((k) => Number(upper.reduce((sum, v) => sum + BigInt(at[v][k]), 0n) / BigInt(upper.length)));
+        const distances = upper.map((v) => square(at[v], mean));
+        let from = 0, to = distances.indexOf(distances.reduce((x, y) => (y > x ? y : x)));
+        for (let i = 0; i < 2; i++) {
+            from = this.nearest(lower, upper[to]);
+            to = this.nearest(upper, lower[from]);
+        }
+        return [from, to];
     }
 
     private tile(a: number[], b: number[]): void {
-        const [f, g] = this.nearest(a, b), m = a.length, n = b.length, rows = m > 1 ? m : 0, columns = n > 1 ? n : 0;
+        const [f, g] = this.start(a, b), m = a.length, n = b.length, rows = m > 1 ? m : 0, columns = n > 1 ? n : 0;
         const low = (i: number): number => a[(f + i) % m], high = (k: number): number => b[(g + k) % n];
         const sum: bigint[][] = [], fromBelow: boolean[][] = [];
         for (let i = 0; i <= rows; i++) {
