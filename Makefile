@@ -167,6 +167,7 @@ $(VIEWER): $(WASM) $(RASTERS) $(TUBES) web/node_modules/.package-lock.json web/b
 	$(Q)cd web && node build.mjs ../$(WASM) ../$(RASTERS) ../$(TUBES) ../$(VIEWER)
 # Written with the page.
 $(addprefix web/dist/,extras.js decoder.txt rasters.txt tubes.txt): $(VIEWER)
+	@:                                      # without a recipe make would not see that they are new
 $(DRACO_PAGE): web/node_modules/.package-lock.json web/build_draco.mjs $(wildcard web/src/draco*)
 	@echo "  web   $@"
 	$(Q)cd web && node build_draco.mjs ../$(DRACO_PAGE)

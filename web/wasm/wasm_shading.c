@@ -112,8 +112,10 @@ lathe_status lathe__shade(int16_t *shading, const float *positions, uint32_t ver
         free(normals);
         return LATHE_ERR_MEMORY;
     }
-    for (uint32_t v = 0; v < vertex_count; v++)
-        visit(&d, positions + 3 * (size_t)v, length_of(normals + 3 * (size_t)v) / (6 * d.step * d.step));
+    for (uint32_t v = 0; v < vertex_count; v++) {
+        float cells = length_of(normals + 3 * (size_t)v) / (6 * d.step * d.step);
+        visit(&d, positions + 3 * (size_t)v, cells < 1 ? cells : 1);   /* what a fan has beyond that lies elsewhere */
+    }
     for (int axis = 0; axis < 3; axis++) blur_axis(&d, axis);
     for (uint32_t v = 0; v < vertex_count; v++) {
         float *n = normals + 3 * (size_t)v, length = length_of(n), ahead[3];
